@@ -1,0 +1,25 @@
+# cmake --install and find_package(nacre).
+include(CMakePackageConfigHelpers)
+
+get_property(stages GLOBAL PROPERTY NACRE_STAGES)
+install(TARGETS ${stages} EXPORT nacreTargets
+  ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR}
+  FILE_SET HEADERS DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/nacre)
+install(EXPORT nacreTargets NAMESPACE nacre::
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/nacre)
+configure_package_config_file(cmake/nacreConfig.cmake.in
+  ${CMAKE_CURRENT_BINARY_DIR}/nacreConfig.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/nacre)
+write_basic_package_version_file(${CMAKE_CURRENT_BINARY_DIR}/nacreConfigVersion.cmake
+  COMPATIBILITY SameMinorVersion)
+install(FILES
+  ${CMAKE_CURRENT_BINARY_DIR}/nacreConfig.cmake
+  ${CMAKE_CURRENT_BINARY_DIR}/nacreConfigVersion.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/nacre)
+if(TARGET nacre)
+  install(TARGETS nacre RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+endif()
+if(NACRE_WITH_RIGS)
+  install(DIRECTORY rigs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre/rigs
+    FILES_MATCHING PATTERN "*.toml")
+endif()

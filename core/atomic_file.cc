@@ -1,0 +1,126 @@
+#include "core/atomic_file.h"
+
+#include "core/error.h"
+
+#include <atomic>
+#include <cerrno>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <system_error>
+#include <unistd.h>
+
+namespace nacre {
+namespace {
+
+void FlushToDisk(const std::filesystem::path& path, int flags) {
+  const int fd = ::open(path.c_str(), flags | O_CLOEXEC);
+  if (fd < 0) {
+    throw SystemError("cannot open " + path.string() + " to flush it");
+  }
+  const int result = ::fsync(fd);
+  const int error = errno;
+  ::close(fd);
+  if (result != 0) {
+    errno = error;
+    throw SystemError("cannot flush " + path.string());
+  }
+}
+
+std::filesystem::path FolderOf(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+}
+
+}  // namespace
+
+AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
+  static std::atomic<unsigned> counter{0};
+  const std::filesystem::path folder = FolderOf(path_);
+  if (!std::filesystem::is_directory(folder)) {
+    throw Error(fmt::format(
+        "cannot write {}: there is no folder {}", path_.string(), folder.string()));
+  }
+  temporary_path_ = folder / fmt::format(".{}.{}.{}.tmp{}",
+                                         path_.stem().string(),
+                                         ::getpid(),
+                                         counter++,
+                                         path_.extension().string());
+}
+
+AtomicFile::~AtomicFile() {
+  if (!committed_) {
+    std::error_code ignored;  // nothing to remove if nothing was written
+    std::filesystem::remove(temporary_path_, ignored);
+  }
+}
+
+void AtomicFile::Commit() {
+  FlushToDisk(temporary_path_, O_RDONLY);
+  std::error_code error;
+  std::filesystem::rename(temporary_path_, path_, error);
+  if (error) {
+    throw Error(
+        fmt::format("cannot rename to {}: {}", path_.string(), error.message()));
+  }
+  committed_ = true;
+  FlushToDisk(FolderOf(path_), O_RDONLY | O_DIRECTORY);
+}
+
+void WriteFile(const std::filesystem::path& path, std::string_view bytes) {
+  AtomicFile file(path);
+  const int fd = ::open(
+      file.temporary_path().c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+  if (fd < 0) {
+    throw SystemError("cannot write " + path.string());
+  }
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) {
+      continue;
+    }
+    if (written < 0) {
+      const int error = errno;
+      ::close(fd);
+      errno = error;
+      throw SystemError("cannot write " + path.string());
+    }
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+  if (::close(fd) != 0) {
+    throw SystemError("cannot write " + path.string());
+  }
+  file.Commit();
+}
+
+std::string ReadFile(const std::filesystem::path& path, std::uint64_t max_bytes) {
+  const int fd = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (fd < 0) {
+    throw SystemError("cannot read " + path.string());
+  }
+  std::string bytes;
+  std::string chunk(1 << 16, '\0');
+  for (;;) {
+    const ssize_t got = ::read(fd, chunk.data(), chunk.size());
+    if (got < 0 && errno == EINTR) {
+      continue;
+    }
+    if (got < 0) {
+      const int error = errno;
+      ::close(fd);
+      errno = error;
+      throw SystemError("cannot read " + path.string());
+    }
+    if (got == 0) {
+      break;
+    }
+    if (bytes.size() + static_cast<std::size_t>(got) > max_bytes) {
+      ::close(fd);
+      throw BadData(fmt::format(
+          "{}: larger than the {} bytes expected at most", path.string(), max_bytes));
+    }
+    bytes.append(chunk.data(), static_cast<std::size_t>(got));
+  }
+  ::close(fd);
+  return bytes;
+}
+
+}  // namespace nacre
