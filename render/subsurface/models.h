@@ -1,0 +1,67 @@
+#pragma once
+
+#include "core/options.h"
+#include "factor/material.h"
+#include "render/subsurface/subsurface.h"
+
+#include <memory>
+
+namespace nacre::render {
+
+/// A homogeneous medium under the dipole model [Jensen01], a value a channel (R, G, B).
+struct DipoleParameters {
+  Color sigma_a_per_mm;
+  Color sigma_s_prime_per_mm;  ///< σ_s (1 − g)
+  float eta = 1.5F;            ///< refractive index inside / outside
+};
+
+/// How finely light is gathered; the defaults are good to about 1 %.
+struct DipoleOptions {
+  /// A cluster of patches counts as one source if its diameter is below this fraction
+  /// of its distance. 0 gathers every patch.
+  double max_relative_extent = 0.35;
+  /// Side of the patches in transport mean free paths of the most scattering channel.
+  double patch_mean_free_paths = 0.8;
+
+  template <class Self, class Visitor>
+  static void Visit(Self& self, Visitor&& visit) {
+    visit("max_relative_extent",
+          self.max_relative_extent,
+          Range{0, 1},
+          "cluster diameter / distance below which a cluster is one source");
+    visit("patch_mean_free_paths",
+          self.patch_mean_free_paths,
+          Range{0.05, 8},
+          "side of the patches in transport mean free paths");
+  }
+};
+
+/// Throws a usage Error for coefficients that are negative, not finite or all zero, or
+/// eta < 1.
+std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parameters,
+                                                  const DipoleOptions& options = {});
+
+struct FactoredOptions {
+  double patches_per_pitch = 2;  ///< patch side = pitch / this
+  double window_cache_mb = 256;  ///< evaluated windows kept, at most
+
+  template <class Self, class Visitor>
+  static void Visit(Self& self, Visitor&& visit) {
+    visit("patches_per_pitch",
+          self.patches_per_pitch,
+          Range{0.5, 8},
+          "patches along one pitch of the material");
+    visit("window_cache_mb",
+          self.window_cache_mb,
+          Range{0, 65536},
+          "memory for evaluated windows; beyond it they are evaluated again");
+  }
+};
+
+/// A measured, factored material (`<subsurface type="svd">`). One channel serves all
+/// three colours, three serve R, G, B in order; BadData for any other number.
+std::shared_ptr<const SubsurfaceModel> MakeFactored(
+    std::shared_ptr<const factor::Material> material,
+    const FactoredOptions& options = {});
+
+}  // namespace nacre::render
