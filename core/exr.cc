@@ -19,8 +19,10 @@
 namespace nacre {
 namespace {
 
-Imf::Header HeaderOf(const ExrPart& part) {
-  Imf::Header header(part.width, part.height);
+// All parts of a file share one display window, so that of the first serves for all.
+Imf::Header HeaderOf(const ExrPart& part, const ExrPart& first) {
+  Imf::Header header(first.width, first.height);
+  header.dataWindow() = Imath::Box2i({0, 0}, {part.width - 1, part.height - 1});
   header.compression() = Imf::ZIP_COMPRESSION;
   header.setType(Imf::SCANLINEIMAGE);
   if (!part.name.empty()) {
@@ -111,7 +113,7 @@ void WriteExr(const std::filesystem::path& path, const std::vector<ExrPart>& par
     Expect(part.width > 0 && part.height > 0, "a picture with pixels");
     Expect(part.values.size() == part.PixelCount() * part.channels.size(),
            "channels * height * width values");
-    headers.push_back(HeaderOf(part));
+    headers.push_back(HeaderOf(part, parts.front()));
   }
   AtomicFile file(path);
   try {
