@@ -1,0 +1,168 @@
+#include "acquire/rig.h"
+
+#include "core/atomic_file.h"
+#include "core/hash.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <set>
+
+namespace nacre::acquire {
+namespace {
+
+// Of a picture's exposure, in all sensible rigs: 1 µs to a quarter of an hour.
+constexpr Range kExposureUs{1, 1e9};
+constexpr int kMaxPoints = 4096;
+
+std::vector<double> Exposures(const TomlTable& table, const std::string& key) {
+  std::vector<double> exposures_us = table.Numbers(key, kExposureUs);
+  if (exposures_us.empty()) {
+    throw table.At(key, "needs at least one exposure");
+  }
+  const std::set<double> distinct(exposures_us.begin(), exposures_us.end());
+  if (distinct.size() != exposures_us.size()) {
+    throw table.At(key, "the same exposure is given twice");
+  }
+  return exposures_us;
+}
+
+SampleDescription ReadSample(const TomlTable& table) {
+  SampleDescription sample;
+  sample.name = table.Text("name");
+  if (sample.name.empty()) {
+    throw table.At("name", "is empty");
+  }
+  sample.eta = table.Number("eta", Range{1, 4});
+  table.RejectUnknownKeys();
+  return sample;
+}
+
+GridDescription ReadGrid(const TomlTable& table) {
+  GridDescription grid;
+  const std::vector<double> points = table.Numbers("points", Range{1, kMaxPoints});
+  if (points.size() != 2 || points[0] != std::floor(points[0]) ||
+      points[1] != std::floor(points[1])) {
+    throw table.At("points", "expected two whole numbers, [along x, along y]");
+  }
+  grid.points_x = static_cast<int>(points[0]);
+  grid.points_y = static_cast<int>(points[1]);
+  grid.pitch_mm = table.Number("pitch_mm", Range{1e-3, 1e3});
+  grid.core = table.Integer("core", Range{1, 1001});
+  if (grid.core % 2 == 0) {
+    throw table.At("core",
+                   fmt::format("{} is even; the window has a cell in its middle, so "
+                               "it must be odd",
+                               grid.core));
+  }
+  table.RejectUnknownKeys();
+  return grid;
+}
+
+CameraDescription ReadCamera(const TomlTable& table) {
+  CameraDescription camera;
+  camera.exposures_us = Exposures(table, "exposures_us");
+  if (!std::is_sorted(camera.exposures_us.rbegin(), camera.exposures_us.rend())) {
+    throw table.At("exposures_us", "must run from the longest to the shortest");
+  }
+  camera.dark_frames = table.Integer("dark_frames", Range{2, 1000});
+  camera.target_exposure_us = table.Number("target_exposure_us", kExposureUs);
+  camera.flat_exposures_us = Exposures(table, "flat_exposures_us");
+  if (camera.flat_exposures_us.size() < 2) {
+    throw table.At("flat_exposures_us",
+                   "photon transfer is a line through at least two exposures");
+  }
+  table.RejectUnknownKeys();
+  return camera;
+}
+
+TargetsDescription ReadTargets(const TomlTable& table) {
+  TargetsDescription targets;
+  targets.checkerboard_columns = table.Integer("checkerboard_columns", Range{3, 200});
+  targets.checkerboard_rows = table.Integer("checkerboard_rows", Range{3, 200});
+  if (targets.checkerboard_columns == targets.checkerboard_rows) {
+    throw table.At("checkerboard_rows",
+                   "must differ from checkerboard_columns: a square board looks the "
+                   "same when it lies a quarter turn round");
+  }
+  targets.checkerboard_square_mm =
+      table.Number("checkerboard_square_mm", Range{0.01, 1e3});
+  targets.checkerboard_poses = table.Integer("checkerboard_poses", Range{3, 200});
+  targets.reference_reflectance = table.Number("reference_reflectance", Range{0.01, 1});
+  targets.reference_exposure_us = table.Number("reference_exposure_us", kExposureUs);
+  // A cubic in two variables has ten coefficients and needs four distinct positions
+  // along each axis; the fifth makes the residual mean something.
+  targets.laser_lattice = table.Integer("laser_lattice", Range{5, 99});
+  table.RejectUnknownKeys();
+  return targets;
+}
+
+ScannerDescription ReadScanner(const TomlTable& table) {
+  ScannerDescription scanner;
+  scanner.mm_per_rad = table.Number("mm_per_rad", Range{1, 1e5});
+  scanner.channels = table.Texts("channels", {"R", "G", "B"});
+  const std::set<std::string> distinct(scanner.channels.begin(),
+                                       scanner.channels.end());
+  if (scanner.channels.empty() || distinct.size() != scanner.channels.size() ||
+      distinct.contains("")) {
+    throw table.At("channels", "expected different, non-empty names");
+  }
+  table.RejectUnknownKeys();
+  return scanner;
+}
+
+ScheduleDescription ReadSchedule(const std::optional<TomlTable>& table, int core) {
+  // Windows of 1.0 core would just not overlap; 1.4 leaves light from the neighbour's
+  // spot at the edge of a window two thirds of a core of further decay.
+  ScheduleDescription schedule;
+  schedule.spot_spacing_cells = static_cast<int>(std::ceil(1.4 * core));
+  if (table) {
+    schedule.spot_spacing_cells = table->Integer(
+        "spot_spacing_cells", schedule.spot_spacing_cells, Range{1, 8192});
+    if (schedule.spot_spacing_cells < core) {
+      throw table->At("spot_spacing_cells",
+                      fmt::format("{} is less than core = {}: the windows of two spots "
+                                  "of one picture would overlap",
+                                  schedule.spot_spacing_cells,
+                                  core));
+    }
+    schedule.order_seed =
+        static_cast<std::uint64_t>(table->Integer("order_seed", 0, Range{0, 2e9}));
+    table->RejectUnknownKeys();
+  }
+  return schedule;
+}
+
+}  // namespace
+
+RigDescription ParseRig(const std::string& text, const std::filesystem::path& path) {
+  const TomlTable root = TomlTable::FromText(text, path.string());
+  RigDescription rig;
+  rig.path = path;
+  rig.text = text;
+  rig.hash = HashHex(text.data(), text.size());
+  rig.kind = root.Text("kind");
+  if (rig.kind != "simulated") {
+    throw DeviceError(
+        root.At("kind",
+                fmt::format("this build has no driver for '{}'; it knows: simulated",
+                            rig.kind))
+            .what());
+  }
+  rig.sample = ReadSample(root.Table("sample"));
+  rig.grid = ReadGrid(root.Table("grid"));
+  rig.camera = ReadCamera(root.Table("camera"));
+  rig.targets = ReadTargets(root.Table("targets"));
+  rig.scanner = ReadScanner(root.Table("scanner"));
+  rig.schedule = ReadSchedule(root.FindTable("schedule"), rig.grid.core);
+  root.Has("simulated");  // belongs to rigs/, which checks it
+  root.RejectUnknownKeys();
+  return rig;
+}
+
+RigDescription ReadRig(const std::filesystem::path& path) {
+  constexpr std::uint64_t kMaxBytes = 16 << 20;
+  return ParseRig(ReadFile(path, kMaxBytes), path);
+}
+
+}  // namespace nacre::acquire

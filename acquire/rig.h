@@ -1,0 +1,93 @@
+#pragma once
+
+#include "acquire/scan_map.h"
+#include "core/toml.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace nacre::acquire {
+
+/// [sample]
+struct SampleDescription {
+  std::string name;
+  double eta = 1;  ///< refractive index
+};
+
+/// [grid]: where the laser goes, as in reconstruct/rd_dataset.h.
+struct GridDescription {
+  int points_x = 0;
+  int points_y = 0;
+  double pitch_mm = 0;
+  int core = 0;  ///< odd; cells a side of the window around each point
+
+  std::int64_t PointCount() const { return std::int64_t{points_x} * points_y; }
+  /// Column i from the left, row j from the top.
+  PointMm Point(int i, int j) const {
+    return {(i - 0.5 * (points_x - 1)) * pitch_mm,
+            (0.5 * (points_y - 1) - j) * pitch_mm};
+  }
+  /// From the origin to the edge of the outermost window.
+  double HalfWidthMm() const { return 0.5 * (points_x - 1 + core) * pitch_mm; }
+  double HalfHeightMm() const { return 0.5 * (points_y - 1 + core) * pitch_mm; }
+};
+
+/// [camera]
+struct CameraDescription {
+  std::vector<double> exposures_us;       ///< bracket of a grid picture, longest first
+  int dark_frames = 0;                    ///< at every exposure that is used anywhere
+  double target_exposure_us = 0;          ///< checkerboard pictures
+  std::vector<double> flat_exposures_us;  ///< photon transfer; a pair of pictures each
+};
+
+/// [targets]
+struct TargetsDescription {
+  int checkerboard_columns = 0;  ///< inner corners along x
+  int checkerboard_rows = 0;     ///< inner corners along y
+  double checkerboard_square_mm = 0;
+  int checkerboard_poses = 0;        ///< pose 0 lies in the sample plane
+  double reference_reflectance = 0;  ///< ρ of the diffuse standard
+  double reference_exposure_us = 0;
+  int laser_lattice = 0;  ///< n: the reference is lit by n × n spots at once
+};
+
+/// [scanner]
+struct ScannerDescription {
+  double mm_per_rad = 0;  ///< nominal, on the sample plane; a few per cent will do
+  std::vector<std::string> channels;
+};
+
+/// [schedule]
+struct ScheduleDescription {
+  int spot_spacing_cells = 0;  ///< between spots of one picture, along each axis
+  std::uint64_t order_seed = 0;
+};
+
+/// A rig and what is to be captured with it, as written in rig.toml.
+struct RigDescription {
+  std::filesystem::path path;  ///< of rig.toml
+  std::string text;            ///< its content, verbatim
+  std::string hash;            ///< of `text`
+  std::string kind;            ///< "simulated"
+  SampleDescription sample;
+  GridDescription grid;
+  CameraDescription camera;
+  TargetsDescription targets;
+  ScannerDescription scanner;
+  ScheduleDescription schedule;
+
+  int ChannelCount() const { return static_cast<int>(scanner.channels.size()); }
+};
+
+/// Reads rig.toml. Throws BadData "file:line: key: …" for everything that is missing,
+/// unknown, out of range or contradictory, and DeviceError for a kind of rig that this
+/// build has no driver for. The table [simulated] belongs to rigs/ and is not looked
+/// into.
+RigDescription ReadRig(const std::filesystem::path& path);
+
+/// The same from text; `path` is for messages and for files named relative to it.
+RigDescription ParseRig(const std::string& text, const std::filesystem::path& path);
+
+}  // namespace nacre::acquire

@@ -1,0 +1,78 @@
+#pragma once
+
+#include "acquire/camera.h"
+#include "acquire/rig.h"
+#include "acquire/scan_map.h"
+#include "acquire/schedule.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace nacre::acquire {
+
+/// One line of the journal: a picture that was taken and is on disk.
+struct JournalEntry {
+  std::int64_t number = -1;  ///< index in the schedule
+  double exposure_us = 0;    ///< as applied by the camera
+  std::string file;          ///< relative to the session folder
+  std::string hash;          ///< xxh3 of that file
+  std::uint64_t frame_id = 0;
+  std::int64_t timestamp_ns = 0;
+  friend bool operator==(const JournalEntry&, const JournalEntry&) = default;
+};
+
+/// What session.json holds.
+struct SessionManifest {
+  std::string rig_text;  ///< rig.toml, verbatim
+  std::string rig_hash;
+  std::string rig_file;  ///< name only
+  CameraInfo camera;
+  IlluminatorInfo illuminator;
+  std::int64_t picture_count = 0;
+  std::optional<ScanMap> scan_map;  ///< once the calibration pictures are taken
+  std::string software_version;
+};
+
+/// A session folder opened for reading:
+///
+///   session.json       the manifest
+///   journal            one checksummed line a picture, append only
+///   frames/000000.png  16-bit grey, lossless; the number is the index in the schedule
+///
+/// Reading is const and may be done from several threads.
+class SessionReader {
+ public:
+  /// Throws BadData for a folder that is no session, a manifest that doesn't parse, or
+  /// a journal with a bad line before its last one. A torn last line is ignored: that
+  /// picture wasn't taken.
+  explicit SessionReader(std::filesystem::path folder);
+
+  const std::filesystem::path& folder() const { return folder_; }
+  const SessionManifest& manifest() const { return manifest_; }
+  const RigDescription& rig() const { return rig_; }
+  const Schedule& schedule() const { return schedule_; }
+
+  /// How many pictures were taken: the numbers below it are there, the others not.
+  std::int64_t picture_count() const {
+    return static_cast<std::int64_t>(journal_.size());
+  }
+  bool IsComplete() const { return picture_count() == schedule_.size(); }
+
+  /// Throws BadData if the picture wasn't taken (resume the capture).
+  const JournalEntry& Entry(std::int64_t number) const;
+
+  /// Reads a picture and verifies checksum and size; exposure_us is the one applied.
+  Frame ReadFrame(std::int64_t number) const;
+
+ private:
+  std::filesystem::path folder_;
+  SessionManifest manifest_;
+  RigDescription rig_;
+  Schedule schedule_;
+  std::vector<JournalEntry> journal_;
+};
+
+}  // namespace nacre::acquire
