@@ -1,0 +1,208 @@
+#include "core/error.h"
+#include "reconstruct/internal/rd_format.h"
+#include "reconstruct/rd_dataset.h"
+
+#include <OpenEXR/ImfChannelList.h>
+#include <OpenEXR/ImfInputPart.h>
+#include <OpenEXR/ImfMultiPartInputFile.h>
+#include <OpenEXR/ImfPartType.h>
+#include <OpenEXR/ImfTileDescription.h>
+#include <OpenEXR/ImfTiledInputPart.h>
+
+#include <cmath>
+#include <fmt/format.h>
+#include <optional>
+
+namespace nacre::reconstruct {
+namespace {
+
+using internal::kChecksum;
+using internal::kPartCount;
+using internal::kPartNames;
+using internal::SliceName;
+
+// deflate can't pack better than this; a header that declares more than it could ever
+// unpack to is a lie, found before memory is taken for it.
+constexpr double kMaxPacking = 1032;
+
+// Runs OpenEXR calls; what it throws becomes BadData about `origin`.
+template <class Call>
+auto Checked(const std::string& origin, const std::string& doing, Call&& call) {
+  try {
+    return call();
+  } catch (const Error&) {
+    throw;
+  } catch (const std::exception& e) {
+    throw BadData(fmt::format("{}: {}: {}", origin, doing, e.what()));
+  }
+}
+
+void CheckPart(const Imf::Header& part,
+               const Imf::Header& expected,
+               const std::string& origin) {
+  const auto require = [&](bool good, const char* what) {
+    if (!good) {
+      throw BadData(
+          fmt::format("{}: part '{}' has the wrong {}", origin, expected.name(), what));
+    }
+  };
+  require(part.hasType() && part.type() == expected.type(), "type");
+  require(part.dataWindow() == expected.dataWindow(),
+          "data window for its attributes nacre.points and nacre.core");
+  require(part.channels() == expected.channels(),
+          "channels for its attribute nacre.channels");
+  if (expected.hasTileDescription()) {
+    require(part.hasTileDescription() &&
+                part.tileDescription() == expected.tileDescription(),
+            "tile size for its attribute nacre.core");
+  }
+}
+
+void CheckSizes(const RdHeader& header,
+                std::uintmax_t bytes,
+                const std::string& origin) {
+  const auto values = static_cast<double>(header.PointCount()) *
+                      static_cast<double>(header.SliceSize());
+  const double unpacked = values * 10 + 8.0 * static_cast<double>(header.PointCount());
+  if (unpacked > kMaxPacking * static_cast<double>(bytes)) {
+    throw BadData(fmt::format(
+        "{}: points ({} x {}), core ({}) and channels ({}) declare {:.0f} bytes, "
+        "more than a file of {} bytes can hold",
+        origin,
+        header.points_x,
+        header.points_y,
+        header.core,
+        header.channels.size(),
+        unpacked,
+        bytes));
+  }
+}
+
+}  // namespace
+
+struct RdReader::File {
+  explicit File(const std::filesystem::path& path)
+      : origin(path.string()),
+        input(path.c_str(), 0, /*reconstructChunkOffsetTable=*/false) {
+    header = ReadHeader(std::filesystem::file_size(path));
+    checksum.emplace(header);
+    tile.emplace(header);
+    ReadChecksums();
+    for (int p = 0; p < kChecksum; ++p) {
+      tiles[static_cast<std::size_t>(p)].emplace(input, p);
+      tiles[static_cast<std::size_t>(p)]->setFrameBuffer(
+          tile->FrameBuffer(static_cast<internal::Part>(p)));
+    }
+  }
+
+  RdHeader ReadHeader(std::uintmax_t bytes) {
+    const RdHeader found = internal::HeaderFromAttributes(input.header(0), origin);
+    CheckSizes(found, bytes, origin);
+    if (input.parts() != kPartCount) {
+      throw BadData(fmt::format(
+          "{}: has {} parts, expected {}", origin, input.parts(), int{kPartCount}));
+    }
+    const std::vector<Imf::Header> expected = internal::PartHeaders(found);
+    for (int p = 0; p < kPartCount; ++p) {
+      const auto name = kPartNames[static_cast<std::size_t>(p)];
+      if (!input.header(p).hasName() || input.header(p).name() != name) {
+        throw BadData(fmt::format("{}: part {} isn't '{}'", origin, p, name));
+      }
+      CheckPart(input.header(p), expected[static_cast<std::size_t>(p)], origin);
+      if (!input.partComplete(p)) {
+        throw BadData(
+            fmt::format("{}: part '{}' is truncated or was never finished: make the "
+                        "file again",
+                        origin,
+                        name));
+      }
+    }
+    return found;
+  }
+
+  void ReadChecksums() {
+    const auto count = static_cast<std::size_t>(header.PointCount());
+    std::vector<std::uint32_t> low(count);
+    std::vector<std::uint32_t> high(count);
+    Imf::FrameBuffer buffer;
+    const auto add = [&](const char* name, std::vector<std::uint32_t>& values) {
+      buffer.insert(name,
+                    Imf::Slice(Imf::UINT,
+                               static_cast<char*>(static_cast<void*>(values.data())),
+                               sizeof(std::uint32_t),
+                               sizeof(std::uint32_t) *
+                                   static_cast<std::size_t>(header.points_x)));
+    };
+    add("low", low);
+    add("high", high);
+    Imf::InputPart part(input, kChecksum);
+    part.setFrameBuffer(buffer);
+    part.readPixels(0, header.points_y - 1);
+    checksums.resize(count);
+    for (std::size_t s = 0; s < count; ++s) {
+      checksums[s] = (std::uint64_t{high[s]} << 32) | low[s];
+    }
+  }
+
+  std::string origin;
+  RdHeader header;
+  std::optional<internal::Checksum> checksum;
+  std::vector<std::uint64_t> checksums;
+  std::optional<internal::TileBuffer> tile;
+  // The parts refer to the file: they are declared after and destroyed before it.
+  Imf::MultiPartInputFile input;
+  std::array<std::optional<Imf::TiledInputPart>, kChecksum> tiles;
+};
+
+RdReader::RdReader(const std::filesystem::path& path) {
+  if (!std::filesystem::is_regular_file(path)) {
+    throw Error("cannot read " + path.string() + ": there is no such file");
+  }
+  Checked(path.string(), "not a readable dataset of R_d", [&] {
+    file_ = std::make_unique<File>(path);
+  });
+}
+
+RdReader::~RdReader() = default;
+RdReader::RdReader(RdReader&&) noexcept = default;
+
+const RdHeader& RdReader::header() const {
+  return file_->header;
+}
+
+RdSlice RdReader::ReadSlice(int i, int j) {
+  File& file = *file_;
+  const RdHeader& header = file.header;
+  Expect(i >= 0 && i < header.points_x && j >= 0 && j < header.points_y,
+         "a slice on the grid");
+  const std::int64_t s = std::int64_t{j} * header.points_x + i;
+  const std::string name = SliceName(header, s);
+  Checked(file.origin, "cannot read " + name, [&] {
+    for (auto& part : file.tiles) {
+      part->readTile(i, j);
+    }
+  });
+  RdSlice slice{
+      file.tile->rd, file.tile->sigma, std::vector<std::uint8_t>(file.tile->rd.size())};
+  for (std::size_t k = 0; k < slice.rd.size(); ++k) {
+    slice.valid[k] = file.tile->valid[k] == internal::kHalfOne ? 1 : 0;
+    if (!std::isfinite(slice.rd[k]) || !std::isfinite(slice.sigma[k])) {
+      throw BadData(
+          fmt::format("{}: {} holds a NaN or an infinity", file.origin, name));
+    }
+    if (file.tile->valid[k] != internal::kHalfOne && file.tile->valid[k] != 0) {
+      throw BadData(
+          fmt::format("{}: {} has a validity other than 0 and 1", file.origin, name));
+    }
+  }
+  if (file.checksum->Of(s, slice) != file.checksums[static_cast<std::size_t>(s)]) {
+    throw BadData(fmt::format(
+        "{}: {} doesn't match its checksum: the file is corrupt; get it or make it "
+        "again",
+        file.origin,
+        name));
+  }
+  return slice;
+}
+
+}  // namespace nacre::reconstruct
