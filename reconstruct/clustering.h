@@ -1,0 +1,62 @@
+#pragma once
+
+#include "core/options.h"
+#include "core/progress.h"
+#include "reconstruct/rd_dataset.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace nacre::reconstruct {
+
+struct ClusterOptions {
+  int clusters = 1;
+  int restarts = 5;
+  int iterations = 100;
+  int dimensions = 24;
+  double log_offset = 0.003;
+  std::uint64_t seed = 1;
+  int thread_count = 0;
+
+  template <class Self, class Visitor>
+  static void Visit(Self& self, Visitor&& visit) {
+    visit("clusters", self.clusters, Range{1, 255}, "groups of slices that look alike");
+    visit(
+        "restarts", self.restarts, Range{1, 1000}, "k-means runs; the best one counts");
+    visit("iterations", self.iterations, Range{1, 100000}, "Lloyd steps a run at most");
+    visit("dimensions",
+          self.dimensions,
+          Range{1, 1024},
+          "random projections a slice is reduced to");
+    visit(
+        "log_offset",
+        self.log_offset,
+        Range{1e-9, 1},
+        "added to a slice, relative to its peak, before the logarithm: what lies below "
+        "is noise");
+    visit("seed", self.seed, Range{0}, "of projections and first centres");
+    visit("thread_count", self.thread_count, Range{0, 4096}, "0: all cores");
+  }
+};
+
+struct Clustering {
+  int cluster_count = 0;  ///< at most what was asked for: fewer if fewer slices differ
+  std::vector<std::uint8_t>
+      labels;          ///< slice j · points_x + i; numbered as they appear
+  double inertia = 0;  ///< Σ squared distance to the own centre, in features
+  int iterations_used = 0;
+};
+
+/// Groups the points x_i by the shape of R'_d(x_i, ·): k-means [Lloyd82] from k-means++
+/// seeds [ArthurVassilvitskii07] on random projections [Achlioptas03] of
+/// ln(R'_d / peak + offset), all channels. The same for any number of threads.
+Clustering ClusterSlices(const RdDataset& dataset,
+                         const ClusterOptions& options,
+                         const ProgressFunction& progress = {});
+
+/// The same, reading slice by slice: memory is points · dimensions.
+Clustering ClusterSlices(RdReader& reader,
+                         const ClusterOptions& options,
+                         const ProgressFunction& progress = {});
+
+}  // namespace nacre::reconstruct
