@@ -1,0 +1,139 @@
+#include "core/error.h"
+#include "core/fresnel.h"
+#include "render/subsurface/dipole_table.h"
+#include "render/subsurface/models.h"
+#include "render/subsurface/patch_tree.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+#include <numbers>
+
+namespace nacre::render {
+namespace {
+
+ColorLanes ToLanes(Color c) {
+  return {{c.x, c.y, c.z, 0}};
+}
+
+class DipoleGather final : public Subsurface {
+ public:
+  DipoleGather(const std::array<DipoleProfile, 3>& profiles,
+               std::vector<Patch> patches,
+               double max_relative_extent,
+               int thread_count)
+      : table_(profiles, LargestDisc(patches), thread_count),
+        tree_(std::move(patches)),
+        max_relative_extent_(static_cast<float>(max_relative_extent)) {
+    for (const Patch& patch : tree_.patches()) {
+      patches_.push_back({ToLanes(patch.flux_w), Disc2(patch)});
+    }
+    for (const PatchTree::Node& node : tree_.nodes()) {
+      nodes_.push_back({ToLanes(node.flux_w), node.variance_mm2});
+    }
+  }
+
+  Color Exitance(const SurfacePoint& x_o) const override {
+    ColorLanes sum;
+    tree_.Visit(
+        x_o.position_mm,
+        max_relative_extent_,
+        table_.reach_mm(),
+        [&](std::int32_t node, float r2_mm2) {
+          const Source& source = nodes_[static_cast<std::size_t>(node)];
+          table_.AddFar(r2_mm2, source.extent_mm2, source.flux_w, sum);
+        },
+        [&](std::int32_t patch, float r2_mm2) {
+          const Source& source = patches_[static_cast<std::size_t>(patch)];
+          table_.AddDisc(r2_mm2, source.extent_mm2, source.flux_w, sum);
+        });
+    return {sum.v[0], sum.v[1], sum.v[2]};
+  }
+
+ private:
+  struct Source {
+    ColorLanes flux_w;
+    float extent_mm2;  ///< squared radius of a patch, variance of a node
+  };
+
+  static float Disc2(const Patch& patch) {
+    return patch.area_mm2 / std::numbers::pi_v<float>;
+  }
+  static double LargestDisc(const std::vector<Patch>& patches) {
+    float largest = 0;
+    for (const Patch& patch : patches) {
+      largest = std::max(largest, Disc2(patch));
+    }
+    return std::sqrt(static_cast<double>(largest));
+  }
+
+  DipoleTable table_;
+  PatchTree tree_;
+  std::vector<Source> patches_;
+  std::vector<Source> nodes_;
+  float max_relative_extent_;
+};
+
+class Dipole final : public SubsurfaceModel {
+ public:
+  Dipole(const std::array<DipoleProfile, 3>& profiles,
+         float eta,
+         float patch_mm,
+         const DipoleOptions& options)
+      : profiles_(profiles), eta_(eta), patch_mm_(patch_mm), options_(options) {}
+
+  float Eta() const override { return eta_; }
+  float PatchSizeMm() const override { return patch_mm_; }
+  std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
+                                         int thread_count) const override {
+    return std::make_unique<DipoleGather>(profiles_,
+                                          GatherPatches(lit, patch_mm_),
+                                          options_.max_relative_extent,
+                                          thread_count);
+  }
+
+ private:
+  std::array<DipoleProfile, 3> profiles_;
+  float eta_;
+  float patch_mm_;
+  DipoleOptions options_;
+};
+
+}  // namespace
+
+std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parameters,
+                                                  const DipoleOptions& options) {
+  Validate(options);
+  if (!(parameters.eta >= 1 && std::isfinite(parameters.eta))) {
+    throw UsageError(
+        fmt::format("a dipole with refractive index {}: at least 1 is "
+                    "needed (inside relative to outside)",
+                    parameters.eta));
+  }
+  const double internal_reflectance =
+      DiffuseFresnelReflectance(1 / static_cast<double>(parameters.eta));
+  const auto profile = [&](int c) {
+    return DipoleProfile(static_cast<double>(parameters.sigma_a_per_mm[c]),
+                         static_cast<double>(parameters.sigma_s_prime_per_mm[c]),
+                         internal_reflectance);
+  };
+  const std::array<DipoleProfile, 3> profiles{profile(0), profile(1), profile(2)};
+  double mean_free_path_mm = std::numeric_limits<double>::infinity();
+  for (const DipoleProfile& p : profiles) {
+    if (p.Total() > 0) {
+      mean_free_path_mm = std::min(mean_free_path_mm, p.MeanFreePathMm());
+    }
+  }
+  if (!std::isfinite(mean_free_path_mm)) {
+    throw UsageError("a dipole that scatters in no channel: sigma_s' is 0 in all");
+  }
+  return std::make_shared<Dipole>(
+      profiles,
+      parameters.eta,
+      static_cast<float>(options.patch_mean_free_paths * mean_free_path_mm),
+      options);
+}
+
+}  // namespace nacre::render

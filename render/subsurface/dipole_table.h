@@ -1,0 +1,90 @@
+#pragma once
+
+#include "render/subsurface/dipole_profile.h"
+
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <vector>
+
+namespace nacre::render {
+
+/// R, G, B and one unused lane, so that a colour is one register.
+struct alignas(16) ColorLanes {
+  std::array<float, 4> v{};
+};
+
+/// Places on the axis of squared distances: 32 to the octave, taken from the bits of
+/// the float itself, so that finding one takes no logarithm.
+class SquaredDistanceAxis {
+ public:
+  SquaredDistanceAxis() = default;
+  SquaredDistanceAxis(double r_min_mm, double r_max_mm);
+
+  struct Place {
+    std::uint32_t index;
+    float fraction;
+  };
+  /// Distances below r_min count as r_min; beyond r_max the place is the last one.
+  Place Find(float r2_mm2) const {
+    const float clamped = r2_mm2 < low_ ? low_ : r2_mm2 > high_ ? high_ : r2_mm2;
+    const std::uint32_t offset = std::bit_cast<std::uint32_t>(clamped) - origin_;
+    return {offset >> kShift, static_cast<float>(offset & kMask) * kStep};
+  }
+  std::uint32_t size() const { return size_; }
+  double Distance(std::uint32_t index) const;
+
+ private:
+  static constexpr int kShift = 23 - 5;
+  static constexpr std::uint32_t kMask = (1u << kShift) - 1;
+  static constexpr float kStep = 1.0F / static_cast<float>(1u << kShift);
+  std::uint32_t origin_ = 0;
+  std::uint32_t size_ = 0;
+  float low_ = 0;
+  float high_ = 0;
+};
+
+/// R_d of three channels, tabulated over squared distance for sources of finite extent.
+/// Good to about 0.05 %.
+class DipoleTable {
+ public:
+  /// For discs up to `largest_disc_mm` in radius.
+  DipoleTable(const std::array<DipoleProfile, 3>& profiles,
+              double largest_disc_mm,
+              int thread_count);
+
+  /// Adds flux · (R_d averaged over a disc of squared radius `disc2_mm2`) to sum.
+  void AddDisc(float r2_mm2,
+               float disc2_mm2,
+               const ColorLanes& flux,
+               ColorLanes& sum) const;
+
+  /// Adds flux · R_d for a source, well away, of variance `variance_mm2` along each
+  /// direction.
+  void AddFar(float r2_mm2,
+              float variance_mm2,
+              const ColorLanes& flux,
+              ColorLanes& sum) const;
+
+  /// Beyond this, nothing.
+  float reach_mm() const { return reach_mm_; }
+
+ private:
+  struct FarEntry {
+    ColorLanes rd;
+    ColorLanes half_laplacian;
+  };
+  void FillFar(const std::array<DipoleProfile, 3>& profiles);
+  void FillNear(const std::array<DipoleProfile, 3>& profiles,
+                double largest_disc_mm,
+                int thread_count);
+
+  float reach_mm_ = 0;
+  SquaredDistanceAxis far_axis_;
+  std::vector<FarEntry> far_;
+  SquaredDistanceAxis near_axis_;
+  std::vector<ColorLanes> near_;  ///< a row for each of kDiscs squared radii
+  float discs_per_mm2_ = 0;
+};
+
+}  // namespace nacre::render

@@ -1,0 +1,75 @@
+#pragma once
+
+#include "render/subsurface/lit_point_cloud.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace nacre::render {
+
+/// An octree over patches in which a node stands for all its patches as one source
+/// [Jensen02]. Nodes lie in depth-first order.
+class PatchTree {
+ public:
+  struct Node {
+    Vec3 centre_mm;          ///< weighted by flux
+    float radius_mm = 0;     ///< of the sphere around the centre with all its patches
+    Color flux_w;            ///< sum over its patches
+    float variance_mm2 = 0;  ///< of the flux along one direction in the surface
+    std::int32_t begin = 0;  ///< its patches
+    std::int32_t end = 0;
+    std::int32_t next = 0;       ///< the node after its subtree
+    std::int32_t brightest = 0;  ///< its patch of the largest flux
+  };
+
+  PatchTree() = default;
+  explicit PatchTree(std::vector<Patch> patches);
+
+  const std::vector<Patch>& patches() const { return patches_; }
+  const std::vector<Node>& nodes() const { return nodes_; }
+
+  /// Visits every patch nearer to x than `reach_mm` exactly once: on its own,
+  /// on_patch(index, distance²), or as part of a node whose diameter is less than
+  /// `max_relative_extent` of its distance, on_node(index, distance²). What is farther
+  /// may be visited too.
+  template <class OnNode, class OnPatch>
+  void Visit(Vec3 x_mm,
+             float max_relative_extent,
+             float reach_mm,
+             OnNode&& on_node,
+             OnPatch&& on_patch) const {
+    const auto node_count = static_cast<std::int32_t>(nodes_.size());
+    // diameter < ε distance, squared
+    const float open2 = 4 / (max_relative_extent * max_relative_extent);
+    for (std::int32_t n = 0; n < node_count;) {
+      const Node& node = nodes_[static_cast<std::size_t>(n)];
+      const Vec3 d = x_mm - node.centre_mm;
+      const float distance2 = Dot(d, d);
+      const float far = reach_mm + node.radius_mm;
+      if (distance2 > far * far) {
+        n = node.next;
+      } else if (node.end - node.begin > 1 &&
+                 node.radius_mm * node.radius_mm * open2 < distance2) {
+        on_node(n, distance2);
+        n = node.next;
+      } else if (node.next == n + 1) {
+        for (std::int32_t p = node.begin; p < node.end; ++p) {
+          const Vec3 e = x_mm - positions_mm_[static_cast<std::size_t>(p)];
+          on_patch(p, Dot(e, e));
+        }
+        n = node.next;
+      } else {
+        ++n;
+      }
+    }
+  }
+
+ private:
+  void Build(std::int32_t begin, std::int32_t end, int level);
+
+  std::vector<Patch> patches_;
+  std::vector<Vec3> positions_mm_;  ///< of the patches once more, close together
+  std::vector<Node> nodes_;
+};
+
+}  // namespace nacre::render
