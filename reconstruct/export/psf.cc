@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "reconstruct/internal/little_endian.h"
 #include "reconstruct/internal/psf_layout.h"
 #include "reconstruct/rd_dataset.h"
 

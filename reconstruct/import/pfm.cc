@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -25,7 +26,7 @@ std::string_view NextWord(std::string_view bytes, std::size_t& at) {
     ++at;
   }
   const std::string_view word = bytes.substr(begin, at - begin);
-  ++at;
+  at = std::min(at + 1, bytes.size());
   return word;
 }
 

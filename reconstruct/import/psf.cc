@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/provenance.h"
+#include "reconstruct/internal/little_endian.h"
 #include "reconstruct/internal/psf_layout.h"
 #include "reconstruct/rd_dataset.h"
 
