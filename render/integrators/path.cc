@@ -1,0 +1,206 @@
+#include "render/integrators/path.h"
+
+#include "core/fresnel.h"
+#include "render/bsdf/fresnel.h"
+#include "render/warp.h"
+
+#include <cmath>
+
+namespace nacre::render {
+namespace {
+
+float PowerHeuristic(float pdf, float other) {
+  const float a = pdf * pdf;
+  return a / (a + other * other);
+}
+
+bool IsBlack(Color c) {
+  return c.x == 0 && c.y == 0 && c.z == 0;
+}
+
+}  // namespace
+
+PathCounters& PathCounters::operator+=(const PathCounters& other) {
+  rays += other.rays;
+  shadow_rays += other.shadow_rays;
+  exitances += other.exitances;
+  return *this;
+}
+
+struct PathTracer::State {
+  Ray ray;
+  Sampler& sampler;
+  PathCounters& counters;
+  int depth = 1;  ///< number of the edge that `ray` is
+  int max_depth;
+  Color radiance{};
+  float alpha = 0;
+  Color throughput{1, 1, 1};
+  float eta_scale = 1;  ///< undoes the index of the medium in Russian roulette
+
+  // How the ray was chosen, for what it may find at its end.
+  bool count_emission = true;
+  bool delta = true;  ///< nothing else could have found it
+  float pdf = 0;
+  Vec3 origin{};
+  Vec3 side{};
+};
+
+PathTracer::PathTracer(const World& world,
+                       const std::vector<std::unique_ptr<Subsurface>>& subsurfaces,
+                       const IntegratorSettings& settings)
+    : world_(world), subsurfaces_(subsurfaces), settings_(settings) {
+  for (const Shape& shape : world.scene().shapes) {
+    const double eta = shape.translucency
+                           ? static_cast<double>(shape.translucency->model->Eta())
+                           : 1.0;
+    exit_scale_.push_back(
+        static_cast<float>(std::numbers::inv_pi / ExitNormalization(eta)));
+  }
+}
+
+PathTracer::Result PathTracer::Radiance(const Ray& ray,
+                                        Sampler& sampler,
+                                        PathCounters& counters) const {
+  const bool direct = settings_.kind == IntegratorSettings::Kind::kDirect;
+  State state{.ray = ray,
+              .sampler = sampler,
+              .counters = counters,
+              .max_depth = direct ? 2 : settings_.max_depth,
+              .count_emission = !settings_.hide_emitters};
+  Trace(state);
+  return {state.radiance, state.alpha};
+}
+
+Color PathTracer::IndirectRadiance(const Ray& ray,
+                                   Sampler& sampler,
+                                   PathCounters& counters) const {
+  State state{.ray = ray,
+              .sampler = sampler,
+              .counters = counters,
+              .depth = 2,
+              .max_depth = settings_.max_depth,
+              .count_emission = false};
+  Trace(state);
+  return state.radiance;
+}
+
+void PathTracer::Trace(State& state) const {
+  const auto deeper = [&] {
+    return state.max_depth < 0 || state.depth < state.max_depth;
+  };
+  while (state.max_depth < 0 || state.depth <= state.max_depth) {
+    ++state.counters.rays;
+    SurfaceHit hit;
+    if (!world_.geometry().Intersect(state.ray, hit)) {
+      if (state.count_emission) {
+        const float other =
+            state.delta ? 0 : world_.BackgroundPdf(state.side, state.ray.direction);
+        const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
+        state.radiance += state.throughput * world_.Background() * weight;
+      }
+      return;
+    }
+    state.alpha = 1;
+    const Vec3 to_viewer = -state.ray.direction;
+    if (state.count_emission && hit.shape->radiance) {
+      const float other = state.delta ? 0 : world_.EmissionPdf(hit, state.origin);
+      const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
+      state.radiance += state.throughput * world_.Emission(hit, to_viewer) * weight;
+    }
+    if (subsurfaces_[hit.shape_index] != nullptr &&
+        Dot(hit.face_normal, to_viewer) > 0) {
+      ++state.counters.exitances;
+      state.radiance += state.throughput * TranslucentRadiance(hit, to_viewer);
+    }
+    if (!deeper() || hit.shape->bsdf == nullptr) {
+      return;
+    }
+    const Frame frame(hit.normal);
+    const Vec3 wo = frame.ToLocal(to_viewer);
+    if (!hit.shape->bsdf->IsDelta()) {
+      AddDirectLight(state, hit, frame, wo);
+    }
+    if (!Continue(state, hit, frame, wo)) {
+      return;
+    }
+  }
+}
+
+void PathTracer::AddDirectLight(State& state,
+                                const SurfaceHit& hit,
+                                const Frame& frame,
+                                Vec3 wo) const {
+  if (world_.light_count() == 0) {
+    return;
+  }
+  const Vec3 side = wo.z > 0 ? hit.normal : -hit.normal;
+  const float u_light = world_.light_count() > 1 ? state.sampler.Next1D() : 0;
+  const LightSample light =
+      world_.SampleLight(hit.position, side, u_light, state.sampler.Next2D());
+  if (!(light.pdf > 0)) {
+    return;
+  }
+  const Vec3 wi = frame.ToLocal(light.wi);
+  // A shading normal must not let light through the true surface.
+  if (wi.z * Dot(hit.face_normal, light.wi) <= 0) {
+    return;
+  }
+  const BsdfValue bsdf = hit.shape->bsdf->Evaluate(wo, wi, hit.uv);
+  if (IsBlack(bsdf.value)) {
+    return;
+  }
+  ++state.counters.shadow_rays;
+  const Ray shadow{OffsetOrigin(hit, light.wi), light.wi, 0, light.distance * 0.9999F};
+  if (world_.geometry().Occluded(shadow)) {
+    return;
+  }
+  const float weight = light.delta ? 1 : PowerHeuristic(light.pdf, bsdf.pdf);
+  state.radiance += state.throughput * bsdf.value * light.radiance * weight;
+}
+
+bool PathTracer::Continue(State& state,
+                          const SurfaceHit& hit,
+                          const Frame& frame,
+                          Vec3 wo) const {
+  const float u_lobe = state.sampler.Next1D();
+  const BsdfSample sample =
+      hit.shape->bsdf->Sample(wo, hit.uv, u_lobe, state.sampler.Next2D());
+  if (!(sample.pdf > 0) || IsBlack(sample.weight)) {
+    return false;
+  }
+  const Vec3 wi = frame.ToWorld(sample.wi);
+  if (sample.wi.z * Dot(hit.face_normal, wi) <= 0) {
+    return false;
+  }
+  state.throughput *= sample.weight;
+  state.eta_scale *= sample.eta * sample.eta;
+  if (state.depth >= settings_.rr_depth) {
+    const float survive =
+        std::min(0.95F, MaxComponent(state.throughput) * state.eta_scale);
+    if (state.sampler.Next1D() >= survive) {
+      return false;
+    }
+    state.throughput *= 1 / survive;
+  }
+  state.delta = sample.delta;
+  state.pdf = sample.pdf;
+  state.origin = hit.position;
+  state.side = wo.z > 0 ? hit.normal : -hit.normal;
+  state.count_emission = true;
+  state.ray = {OffsetOrigin(hit, wi), wi};
+  ++state.depth;
+  return true;
+}
+
+// L_o = M F_t(η, ω_o) / (π c(η)).
+Color PathTracer::TranslucentRadiance(const SurfaceHit& hit, Vec3 to_viewer) const {
+  const Translucency& translucency = *hit.shape->translucency;
+  const SurfacePoint point = ToSurfacePoint(hit, translucency.mm_per_unit);
+  const float cosine = std::min(1.0F, std::abs(Dot(hit.normal, to_viewer)));
+  const float transmitted = 1 - FresnelDielectric(cosine, translucency.model->Eta());
+  return subsurfaces_[hit.shape_index]->Exitance(point) *
+         (transmitted * exit_scale_[hit.shape_index]);
+}
+
+}  // namespace nacre::render

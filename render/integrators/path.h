@@ -1,0 +1,60 @@
+#pragma once
+
+#include "render/sampler.h"
+#include "render/subsurface/subsurface.h"
+#include "render/world.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace nacre::render {
+
+struct PathCounters {
+  std::int64_t rays = 0;
+  std::int64_t shadow_rays = 0;
+  std::int64_t exitances = 0;  ///< questions to models of translucency
+
+  PathCounters& operator+=(const PathCounters& other);
+};
+
+/// A path tracer with light sampling, BSDF sampling and their combination by the power
+/// heuristic [Veach97, section 9.2.4].
+class PathTracer {
+ public:
+  /// All references must outlive it. `subsurfaces`: one a shape, null where opaque.
+  PathTracer(const World& world,
+             const std::vector<std::unique_ptr<Subsurface>>& subsurfaces,
+             const IntegratorSettings& settings);
+
+  struct Result {
+    Color radiance;
+    float alpha = 0;  ///< 1 if the ray hit anything
+  };
+
+  /// Along a camera ray.
+  Result Radiance(const Ray& ray, Sampler& sampler, PathCounters& counters) const;
+
+  /// Along a ray that left a translucent surface whose direct light is known already:
+  /// what emits is left out at its end. The ray is the second edge of its path.
+  Color IndirectRadiance(const Ray& ray,
+                         Sampler& sampler,
+                         PathCounters& counters) const;
+
+ private:
+  struct State;
+  void Trace(State& state) const;
+  void AddDirectLight(State& state,
+                      const SurfaceHit& hit,
+                      const Frame& frame,
+                      Vec3 wo) const;
+  bool Continue(State& state, const SurfaceHit& hit, const Frame& frame, Vec3 wo) const;
+  Color TranslucentRadiance(const SurfaceHit& hit, Vec3 to_viewer) const;
+
+  const World& world_;
+  const std::vector<std::unique_ptr<Subsurface>>& subsurfaces_;
+  IntegratorSettings settings_;
+  std::vector<float> exit_scale_;  ///< 1 / (π c(η)) a shape
+};
+
+}  // namespace nacre::render

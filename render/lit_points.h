@@ -1,0 +1,36 @@
+#pragma once
+
+#include "render/integrators/path.h"
+#include "render/subsurface/subsurface.h"
+#include "render/world.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace nacre::render {
+
+struct LitPointOptions {
+  double points_per_patch = 4;          ///< a patch: PatchSizeMm() squared
+  std::int64_t max_points = 2'000'000;  ///< an object
+  std::uint64_t seed = 1;
+  int thread_count = 0;
+  bool indirect = true;  ///< if the shape wants it too
+};
+
+struct LitPoints {
+  std::vector<LitPoint> points;
+  bool capped = false;  ///< max_points was too few for the patches asked for
+  PathCounters counters;
+  double area_mm2 = 0;
+};
+
+/// Divides the surface of a translucent shape into patches and finds the light that
+/// enters each: direct light of all sources, and what a path tracer brings if the shape
+/// and the integrator want it. Light that leaves a translucent surface and enters one
+/// again isn't followed.
+LitPoints SampleLitPoints(const World& world,
+                          std::uint32_t shape_index,
+                          const PathTracer& tracer,
+                          const LitPointOptions& options);
+
+}  // namespace nacre::render

@@ -1,0 +1,98 @@
+#pragma once
+
+#include "core/exr.h"
+#include "core/options.h"
+#include "core/progress.h"
+#include "render/scene.h"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+
+namespace nacre::render {
+
+struct RenderOptions {
+  int spp = 0;
+  std::string integrator = "scene";
+  std::uint64_t seed = 1;
+  int thread_count = 0;
+  double time_limit_s = 0;
+  double clamp = 0;
+  double points_per_patch = 4;
+  double max_lit_points = 2e6;
+  double snapshot_s = 0;
+
+  template <class Self, class Visitor>
+  static void Visit(Self& self, Visitor&& visit) {
+    visit("spp", self.spp, Range{0, 1 << 24}, "samples a pixel; 0: the scene's");
+    visit("integrator",
+          self.integrator,
+          Range{},
+          "scene (what the file says), path, direct, or fast: path tracing with "
+          "translucency by R_d");
+    visit("time_limit",
+          self.time_limit_s,
+          Range{0, 1e9},
+          "seconds after which no further pass is started; 0: none");
+    visit("clamp",
+          self.clamp,
+          Range{0, 1e30},
+          "upper bound of a sample's radiance, against fireflies; biased; 0: none");
+    visit("points_per_patch",
+          self.points_per_patch,
+          Range{1, 64},
+          "lit points a patch of a translucent surface");
+    visit("max_lit_points",
+          self.max_lit_points,
+          Range{1, 1e9},
+          "lit points a translucent object, at most");
+    visit("snapshot",
+          self.snapshot_s,
+          Range{0, 1e9},
+          "seconds between partial pictures; 0: none");
+  }
+};
+
+/// What was done, and what it cost. Seconds are of the wall.
+struct RenderSummary {
+  int width = 0;
+  int height = 0;
+  int samples_per_pixel = 0;  ///< made; less than asked for if time ran out
+  int thread_count_used = 0;
+  bool time_ran_out = false;
+  std::int64_t triangles = 0;
+  std::int64_t lights = 0;
+  std::int64_t lit_points = 0;
+  bool lit_points_capped = false;  ///< max_lit_points was too few
+  std::int64_t rays = 0;
+  std::int64_t shadow_rays = 0;
+  std::int64_t exitances = 0;    ///< questions to models of translucency
+  std::int64_t bad_samples = 0;  ///< NaN or infinite: left out
+  std::int64_t clamped_samples = 0;
+  double build_s = 0;       ///< the ray tracer's tree
+  double irradiance_s = 0;  ///< light entering translucent objects
+  double models_s = 0;      ///< preparing their models
+  double paths_s = 0;
+  double cpu_s = 0;  ///< of the process, all threads
+
+  std::string Brief() const;  ///< one line
+  std::string Table() const;  ///< some lines, for --stats
+  Json ToJson() const;
+};
+
+struct Rendering {
+  ExrPart image;  ///< linear; channels R, G, B (, A) or Y (, A)
+  RenderSummary summary;
+};
+
+/// Called between passes with the picture so far.
+using SnapshotFunction = std::function<void(const ExrPart&)>;
+
+/// The same scene, options and seed give the same bits for any number of threads
+/// (unless a time limit cuts the work short).
+Rendering Render(const Scene& scene,
+                 const RenderOptions& options = {},
+                 const ProgressFunction& progress = {},
+                 const SnapshotFunction& snapshot = {});
+
+}  // namespace nacre::render

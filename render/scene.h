@@ -1,0 +1,52 @@
+#pragma once
+
+#include "render/camera.h"
+#include "render/film.h"
+#include "render/light.h"
+#include "render/shape.h"
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace nacre::render {
+
+struct IntegratorSettings {
+  enum class Kind { kPath, kDirect };
+  Kind kind = Kind::kPath;
+  int max_depth = -1;          ///< edges of a path from camera to light; −1: no limit
+  int rr_depth = 5;            ///< from this depth on paths may end by Russian roulette
+  bool hide_emitters = false;  ///< lights aren't seen directly
+};
+
+/// All that is in a scene file, ready to render. Lengths in scene units.
+struct Scene {
+  std::string origin;  ///< the file, for messages
+  IntegratorSettings integrator;
+  Camera camera;
+  Film film;
+  int samples_per_pixel = 64;
+  std::vector<Shape> shapes;
+  std::vector<Light> lights;
+  /// What was read but has no effect or another one than elsewhere; for people.
+  std::vector<std::string> notes;
+  /// Scene, meshes, pictures and materials, for provenance.
+  std::vector<std::filesystem::path> files;
+};
+
+struct SceneOptions {
+  std::map<std::string, std::string> defines;  ///< `$name`s, before the file's defaults
+  bool lenient = false;  ///< an unknown word is a note instead of an error
+};
+
+/// Reads a scene in the XML of Mitsuba 0.4–0.6. Throws BadData with file:line.
+Scene ReadScene(const std::filesystem::path& path, const SceneOptions& options = {});
+
+/// The same from memory; relative paths start at `folder`.
+Scene ParseScene(const std::string& xml,
+                 const std::string& origin,
+                 const std::filesystem::path& folder,
+                 const SceneOptions& options = {});
+
+}  // namespace nacre::render

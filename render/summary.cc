@@ -1,0 +1,82 @@
+#include "render/render.h"
+
+#include <fmt/format.h>
+
+namespace nacre::render {
+
+std::string RenderSummary::Brief() const {
+  std::string line = fmt::format(
+      "{} x {} pixels, {} samples each, {:.1f} s on {} threads ({:.1f} CPU-s)",
+      width,
+      height,
+      samples_per_pixel,
+      build_s + irradiance_s + models_s + paths_s,
+      thread_count_used,
+      cpu_s);
+  if (time_ran_out) {
+    line += "; stopped by the time limit";
+  }
+  if (lit_points_capped) {
+    line += "; fewer lit points than the material asks for, see --max-lit-points";
+  }
+  if (bad_samples > 0) {
+    line += fmt::format("; {} samples weren't finite and were left out", bad_samples);
+  }
+  return line;
+}
+
+std::string RenderSummary::Table() const {
+  return fmt::format(
+      "triangles        {:>12}\n"
+      "lights           {:>12}\n"
+      "lit points       {:>12}{}\n"
+      "rays             {:>12}\n"
+      "shadow rays      {:>12}\n"
+      "exitances        {:>12}\n"
+      "bad samples      {:>12}\n"
+      "clamped samples  {:>12}\n"
+      "tree             {:>10.2f} s\n"
+      "irradiance       {:>10.2f} s\n"
+      "models           {:>10.2f} s\n"
+      "paths            {:>10.2f} s\n"
+      "CPU              {:>10.2f} s",
+      triangles,
+      lights,
+      lit_points,
+      lit_points_capped ? " (capped)" : "",
+      rays,
+      shadow_rays,
+      exitances,
+      bad_samples,
+      clamped_samples,
+      build_s,
+      irradiance_s,
+      models_s,
+      paths_s,
+      cpu_s);
+}
+
+Json RenderSummary::ToJson() const {
+  return {{"width", width},
+          {"height", height},
+          {"spp", samples_per_pixel},
+          {"threads", thread_count_used},
+          {"time_ran_out", time_ran_out},
+          {"triangles", triangles},
+          {"lights", lights},
+          {"lit_points", lit_points},
+          {"lit_points_capped", lit_points_capped},
+          {"rays", rays},
+          {"shadow_rays", shadow_rays},
+          {"exitances", exitances},
+          {"bad_samples", bad_samples},
+          {"clamped_samples", clamped_samples},
+          {"seconds",
+           {{"build", build_s},
+            {"irradiance", irradiance_s},
+            {"models", models_s},
+            {"paths", paths_s}}},
+          {"cpu_seconds", cpu_s}};
+}
+
+}  // namespace nacre::render

@@ -1,0 +1,230 @@
+#include "render/world.h"
+
+#include "render/warp.h"
+
+#include <cmath>
+
+namespace nacre::render {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+LightSample FromPoint(Vec3 light, Color intensity, Vec3 position) {
+  const Vec3 to_light = light - position;
+  const float distance2 = Dot(to_light, to_light);
+  if (!(distance2 > 0)) {
+    return {};
+  }
+  const float distance = std::sqrt(distance2);
+  return {to_light / distance, distance, intensity / distance2, 1, true};
+}
+
+float SpotFalloff(const SpotLight& spot, Vec3 to_light) {
+  const float cosine = std::clamp(-Dot(spot.direction, to_light), -1.0F, 1.0F);
+  const float angle = std::acos(cosine);
+  if (angle >= spot.cutoff_rad) {
+    return 0;
+  }
+  return angle <= spot.beam_rad
+             ? 1.0F
+             : (spot.cutoff_rad - angle) / (spot.cutoff_rad - spot.beam_rad);
+}
+
+// Total power of a light, roughly: only how often it is chosen depends on it.
+Color PowerOf(const Light& light, float scene_radius) {
+  const float disk = kPi * scene_radius * scene_radius;
+  if (const auto* point = std::get_if<PointLight>(&light.source)) {
+    return point->intensity * (4 * kPi);
+  }
+  if (const auto* spot = std::get_if<SpotLight>(&light.source)) {
+    return spot->intensity *
+           (2 * kPi *
+            (1 - 0.5F * (std::cos(spot->cutoff_rad) + std::cos(spot->beam_rad))));
+  }
+  if (const auto* directional = std::get_if<DirectionalLight>(&light.source)) {
+    return directional->irradiance * disk;
+  }
+  return std::get<ConstantLight>(light.source).radiance * (kPi * disk);
+}
+
+// Seen from outside, a sphere is a cone; [Shirley96].
+LightSample SampleSphere(const Sphere& sphere, Color radiance, Vec3 position, Vec2 u) {
+  const Vec3 to_center = sphere.center - position;
+  const float distance2 = Dot(to_center, to_center);
+  const float sin2 = sphere.radius * sphere.radius / distance2;
+  const float one_minus_cos = sin2 / (1 + std::sqrt(1 - sin2));
+  const float pdf = 1 / (2 * kPi * one_minus_cos);
+  const Frame frame(to_center / std::sqrt(distance2));
+  const Vec3 wi = frame.ToWorld(SquareToCone(u, one_minus_cos));
+  const float along = Dot(to_center, wi);
+  const float inside =
+      std::max(0.0F, sphere.radius * sphere.radius - (distance2 - along * along));
+  return {wi, along - std::sqrt(inside), radiance / pdf, pdf, false};
+}
+
+bool SeenAsCone(const Sphere& sphere, Vec3 position) {
+  const Vec3 d = sphere.center - position;
+  return !sphere.inward && Dot(d, d) > 1.0001F * sphere.radius * sphere.radius;
+}
+
+}  // namespace
+
+World::World(const Scene& scene, int thread_count)
+    : scene_(scene),
+      geometry_(scene.shapes, thread_count),
+      source_of_shape_(scene.shapes.size(), -1) {
+  const float radius = std::max(geometry_.radius(), 1e-6F);
+  for (const Light& light : scene.lights) {
+    if (const auto* constant = std::get_if<ConstantLight>(&light.source)) {
+      background_ += constant->radiance;
+      background_source_ = static_cast<int>(sources_.size());
+    }
+    Source source;
+    source.light = &light;
+    AddSource(std::move(source), PowerOf(light, radius), light.sampling_weight);
+  }
+  for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
+    const Shape& shape = scene.shapes[i];
+    if (!shape.radiance) {
+      continue;
+    }
+    source_of_shape_[i] = static_cast<int>(sources_.size());
+    Source source;
+    source.emitter.emplace(shape);
+    source.shape_index = static_cast<std::uint32_t>(i);
+    const float area = static_cast<float>(source.emitter->area());
+    AddSource(std::move(source), *shape.radiance * (kPi * area), shape.sampling_weight);
+  }
+  float total = 0;
+  for (const Source& source : sources_) {
+    total += source.probability;
+  }
+  float cumulative = 0;
+  for (Source& source : sources_) {
+    source.probability = total > 0 ? source.probability / total
+                                   : 1.0F / static_cast<float>(sources_.size());
+    cumulative += source.probability;
+    source.cumulative = cumulative;
+  }
+}
+
+void World::AddSource(Source source, Color power, float weight) {
+  source.probability = std::max(0.0F, Luminance(power)) * weight;
+  sources_.push_back(std::move(source));
+}
+
+bool World::IsDeltaLight(std::size_t light) const {
+  const Source& source = sources_[light];
+  return source.light != nullptr &&
+         !std::holds_alternative<ConstantLight>(source.light->source);
+}
+
+LightSample World::SampleLight(Vec3 position, Vec3 side, float u_light, Vec2 u) const {
+  for (std::size_t i = 0; i < sources_.size(); ++i) {
+    if (u_light < sources_[i].cumulative || i + 1 == sources_.size()) {
+      const float probability = sources_[i].probability;
+      if (!(probability > 0)) {
+        return {};
+      }
+      LightSample sample = SampleLight(i, position, side, u);
+      sample.radiance *= 1 / probability;
+      sample.pdf *= probability;
+      return sample;
+    }
+  }
+  return {};
+}
+
+LightSample World::SampleLight(std::size_t light,
+                               Vec3 position,
+                               Vec3 side,
+                               Vec2 u) const {
+  const Source& source = sources_[light];
+  if (source.light == nullptr) {
+    return SampleEmitter(source, position, u);
+  }
+  const auto& any = source.light->source;
+  if (const auto* point = std::get_if<PointLight>(&any)) {
+    return FromPoint(point->position, point->intensity, position);
+  }
+  if (const auto* spot = std::get_if<SpotLight>(&any)) {
+    LightSample sample = FromPoint(spot->position, spot->intensity, position);
+    const float falloff = sample.pdf > 0 ? SpotFalloff(*spot, sample.wi) : 0;
+    sample.radiance *= falloff;
+    sample.pdf = falloff > 0 ? sample.pdf : 0;
+    return sample;
+  }
+  if (const auto* directional = std::get_if<DirectionalLight>(&any)) {
+    return {-directional->direction, kInfinity, directional->irradiance, 1, true};
+  }
+  // A constant light is best sampled by the cosine at the surface.
+  const Vec3 local = SquareToCosineHemisphere(u);
+  const float pdf = CosineHemispherePdf(local.z);
+  return {Frame(side).ToWorld(local),
+          kInfinity,
+          std::get<ConstantLight>(any).radiance / pdf,
+          pdf,
+          false};
+}
+
+LightSample World::SampleEmitter(const Source& source, Vec3 position, Vec2 u) const {
+  const Shape& shape = scene_.shapes[source.shape_index];
+  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry);
+      sphere != nullptr && SeenAsCone(*sphere, position)) {
+    return SampleSphere(*sphere, *shape.radiance, position, u);
+  }
+  const SurfaceHit point = source.emitter->Sample(u);
+  const Vec3 to_light = point.position - position;
+  const float distance2 = Dot(to_light, to_light);
+  if (!(distance2 > 0)) {
+    return {};
+  }
+  const float distance = std::sqrt(distance2);
+  const Vec3 wi = to_light / distance;
+  const float cosine = -Dot(point.face_normal, wi);
+  if (cosine <= 1e-6F) {
+    return {};
+  }
+  const float pdf = distance2 / (cosine * static_cast<float>(source.emitter->area()));
+  return {wi, distance, *shape.radiance / pdf, pdf, false};
+}
+
+Color World::Emission(const SurfaceHit& hit, Vec3 to_viewer) const {
+  return hit.shape->radiance && Dot(hit.face_normal, to_viewer) > 0
+             ? *hit.shape->radiance
+             : Color{};
+}
+
+float World::EmissionPdf(const SurfaceHit& hit, Vec3 position) const {
+  const int index = source_of_shape_[hit.shape_index];
+  if (index < 0) {
+    return 0;
+  }
+  const Source& source = sources_[static_cast<std::size_t>(index)];
+  if (const auto* sphere = std::get_if<Sphere>(&hit.shape->geometry);
+      sphere != nullptr && SeenAsCone(*sphere, position)) {
+    const Vec3 d = sphere->center - position;
+    const float sin2 = sphere->radius * sphere->radius / Dot(d, d);
+    const float one_minus_cos = sin2 / (1 + std::sqrt(1 - sin2));
+    return source.probability / (2 * kPi * one_minus_cos);
+  }
+  const Vec3 to_light = hit.position - position;
+  const float distance2 = Dot(to_light, to_light);
+  const float cosine =
+      -Dot(hit.face_normal, to_light) / std::sqrt(std::max(distance2, 1e-30F));
+  if (cosine <= 1e-6F) {
+    return 0;
+  }
+  return source.probability * distance2 /
+         (cosine * static_cast<float>(source.emitter->area()));
+}
+
+float World::BackgroundPdf(Vec3 side, Vec3 wi) const {
+  if (background_source_ < 0) {
+    return 0;
+  }
+  return sources_[static_cast<std::size_t>(background_source_)].probability *
+         CosineHemispherePdf(Dot(side, wi));
+}
+
+}  // namespace nacre::render
