@@ -1,6 +1,8 @@
 #pragma once
 
 #include "acquire/camera.h"
+#include "acquire/illuminator.h"
+#include "acquire/journal.h"
 #include "acquire/rig.h"
 #include "acquire/scan_map.h"
 #include "acquire/schedule.h"
@@ -13,17 +15,6 @@
 
 namespace nacre::acquire {
 
-/// One line of the journal: a picture that was taken and is on disk.
-struct JournalEntry {
-  std::int64_t number = -1;  ///< index in the schedule
-  double exposure_us = 0;    ///< as applied by the camera
-  std::string file;          ///< relative to the session folder
-  std::string hash;          ///< xxh3 of that file
-  std::uint64_t frame_id = 0;
-  std::int64_t timestamp_ns = 0;
-  friend bool operator==(const JournalEntry&, const JournalEntry&) = default;
-};
-
 /// What session.json holds.
 struct SessionManifest {
   std::string rig_text;  ///< rig.toml, verbatim
@@ -33,21 +24,27 @@ struct SessionManifest {
   IlluminatorInfo illuminator;
   std::int64_t picture_count = 0;
   std::optional<ScanMap> scan_map;  ///< once the calibration pictures are taken
-  std::string software_version;
+  std::uint64_t seed = 0;           ///< of a simulated rig's noise
+  std::string software_version;     ///< that began the session
 };
+
+/// session.json of a folder. Throws BadData for anything missing or contradictory.
+SessionManifest ReadManifest(const std::filesystem::path& folder);
+void WriteManifest(const std::filesystem::path& folder,
+                   const SessionManifest& manifest);
 
 /// A session folder opened for reading:
 ///
 ///   session.json       the manifest
 ///   journal            one checksummed line a picture, append only
-///   frames/000000.png  16-bit grey, lossless; the number is the index in the schedule
+///   frames/000000.pgm  as the sensor gave it; the number is the index in the schedule
 ///
 /// Reading is const and may be done from several threads.
 class SessionReader {
  public:
   /// Throws BadData for a folder that is no session, a manifest that doesn't parse, or
-  /// a journal with a bad line before its last one. A torn last line is ignored: that
-  /// picture wasn't taken.
+  /// a journal with a bad line before a good one. A torn end is ignored: those pictures
+  /// weren't taken.
   explicit SessionReader(std::filesystem::path folder);
 
   const std::filesystem::path& folder() const { return folder_; }

@@ -1,0 +1,164 @@
+#include "acquire/journal.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json.h"
+
+#include <cerrno>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <optional>
+#include <string_view>
+#include <unistd.h>
+
+namespace nacre::acquire {
+namespace {
+
+std::optional<Target> TargetFromName(const std::string& name) {
+  for (const Target target : {Target::kNothing,
+                              Target::kCheckerboard,
+                              Target::kFlat,
+                              Target::kReference,
+                              Target::kSample}) {
+    if (name == Name(target)) {
+      return target;
+    }
+  }
+  return std::nullopt;
+}
+
+// The entry of a line without its newline; empty if its checksum doesn't match.
+std::optional<JournalEntry> ParseLine(std::string_view line,
+                                      const std::string& origin) {
+  const std::size_t tab = line.rfind('\t');
+  if (tab == std::string_view::npos ||
+      line.substr(tab + 1) != HashHex(line.data(), tab)) {
+    return std::nullopt;
+  }
+  // From here on the text is what a writer wrote: what's wrong with it is no accident.
+  const Json json = ParseJson(std::string(line.substr(0, tab)), origin);
+  JournalEntry entry;
+  entry.number = Get<std::int64_t>(json, "number", origin);
+  const auto target = TargetFromName(Get<std::string>(json, "target", origin));
+  if (!target) {
+    throw BadData(origin + ": field 'target': no such target");
+  }
+  entry.picture.target = *target;
+  entry.picture.pose = Get<int>(json, "pose", origin);
+  entry.picture.channel = Get<int>(json, "channel", origin);
+  entry.picture.group = Get<int>(json, "group", origin);
+  entry.picture.repeat = Get<int>(json, "repeat", origin);
+  entry.picture.exposure_us = Get<double>(json, "exposure_us", origin);
+  for (const auto& [i, j] :
+       Get<std::vector<std::pair<int, int>>>(json, "spots", origin)) {
+    entry.spots.push_back({i, j});
+  }
+  entry.exposure_us = Get<double>(json, "applied_exposure_us", origin);
+  entry.file = Get<std::string>(json, "file", origin);
+  entry.hash = Get<std::string>(json, "xxh3", origin);
+  entry.frame_id = Get<std::uint64_t>(json, "frame_id", origin);
+  entry.timestamp_ns = Get<std::int64_t>(json, "timestamp_ns", origin);
+  return entry;
+}
+
+}  // namespace
+
+std::string FormatJournalLine(const JournalEntry& entry) {
+  Json spots = Json::array();
+  for (const GridIndex& spot : entry.spots) {
+    spots.push_back({spot.i, spot.j});
+  }
+  const std::string text = Json{
+      {"number", entry.number},
+      {"target", Name(entry.picture.target)},
+      {"pose", entry.picture.pose},
+      {"channel", entry.picture.channel},
+      {"group", entry.picture.group},
+      {"repeat", entry.picture.repeat},
+      {"spots", spots},
+      {"exposure_us", entry.picture.exposure_us},
+      {"applied_exposure_us", entry.exposure_us},
+      {"file", entry.file},
+      {"xxh3", entry.hash},
+      {"frame_id", entry.frame_id},
+      {"timestamp_ns",
+       entry.timestamp_ns}}.dump();
+  return text + '\t' + HashHex(text.data(), text.size()) + '\n';
+}
+
+Journal ParseJournal(const std::string& text, const std::string& origin) {
+  Journal journal;
+  std::int64_t line_number = 0;
+  std::int64_t first_bad_line = 0;  // 0: none so far
+  for (std::size_t begin = 0; begin < text.size();) {
+    ++line_number;
+    const std::size_t end = text.find('\n', begin);
+    const std::string where = fmt::format("{}:{}", origin, line_number);
+    const std::optional<JournalEntry> entry =
+        end == std::string::npos
+            ? std::nullopt
+            : ParseLine(std::string_view(text).substr(begin, end - begin), where);
+    if (!entry) {
+      first_bad_line = first_bad_line == 0 ? line_number : first_bad_line;
+    } else if (first_bad_line != 0) {
+      throw BadData(fmt::format(
+          "{}:{}: this line is damaged, and good ones follow it; restore the journal "
+          "from a copy, or cut it off before this line to take the pictures from here "
+          "on again",
+          origin,
+          first_bad_line));
+    } else if (entry->number != std::ssize(journal.entries)) {
+      throw BadData(fmt::format("{}: picture {} where {} was to follow",
+                                where,
+                                entry->number,
+                                journal.entries.size()));
+    } else {
+      journal.entries.push_back(*entry);
+      journal.good_bytes = end + 1;
+    }
+    begin = end == std::string::npos ? text.size() : end + 1;
+  }
+  journal.torn_bytes = text.size() - journal.good_bytes;
+  return journal;
+}
+
+JournalWriter::JournalWriter(const std::filesystem::path& path,
+                             std::uint64_t keep_bytes)
+    : path_(path),
+      fd_(::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)) {
+  if (fd_ < 0) {
+    throw SystemError("cannot open " + path_.string());
+  }
+  if (::ftruncate(fd_, static_cast<off_t>(keep_bytes)) != 0) {
+    const Error error = SystemError("cannot cut off the torn end of " + path_.string());
+    ::close(fd_);
+    throw error;
+  }
+}
+
+JournalWriter::~JournalWriter() {
+  ::close(fd_);
+}
+
+void JournalWriter::Append(const JournalEntry& entry) {
+  const std::string line = FormatJournalLine(entry);
+  std::string_view rest = line;
+  while (!rest.empty()) {
+    const ssize_t written = ::write(fd_, rest.data(), rest.size());
+    if (written < 0 && errno == EINTR) {
+      continue;
+    }
+    if (written < 0) {
+      throw SystemError("cannot write " + path_.string());
+    }
+    rest.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void JournalWriter::Flush() {
+  if (::fdatasync(fd_) != 0) {
+    throw SystemError("cannot flush " + path_.string());
+  }
+}
+
+}  // namespace nacre::acquire

@@ -1,0 +1,199 @@
+#include "acquire/session.h"
+
+#include "acquire/frame_file.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/json.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace nacre::acquire {
+namespace {
+
+constexpr const char* kFormat = "nacre session";
+constexpr int kFormatVersion = 1;
+constexpr std::uint64_t kMaxManifestBytes = 64 << 20;
+
+Json ToJson(const CameraInfo& camera) {
+  return Json{{"model", camera.model},
+              {"serial", camera.serial},
+              {"width_px", camera.width},
+              {"height_px", camera.height},
+              {"bit_depth", camera.bit_depth},
+              {"min_exposure_us", camera.min_exposure_us},
+              {"max_exposure_us", camera.max_exposure_us}};
+}
+
+CameraInfo CameraFromJson(const Json& json, const std::string& origin) {
+  CameraInfo camera{.model = Get<std::string>(json, "model", origin),
+                    .serial = Get<std::string>(json, "serial", origin),
+                    .width = Get<int>(json, "width_px", origin),
+                    .height = Get<int>(json, "height_px", origin),
+                    .bit_depth = Get<int>(json, "bit_depth", origin),
+                    .min_exposure_us = Get<double>(json, "min_exposure_us", origin),
+                    .max_exposure_us = Get<double>(json, "max_exposure_us", origin)};
+  if (camera.width < 1 || camera.height < 1 || camera.width > 1 << 16 ||
+      camera.height > 1 << 16 || camera.bit_depth < 9 || camera.bit_depth > 16) {
+    throw BadData(origin + ": field 'camera': no such sensor");
+  }
+  return camera;
+}
+
+Json ToJson(const IlluminatorInfo& illuminator) {
+  return Json{{"model", illuminator.model},
+              {"serial", illuminator.serial},
+              {"channels", illuminator.channels},
+              {"max_angle_rad", illuminator.max_angle_rad}};
+}
+
+IlluminatorInfo IlluminatorFromJson(const Json& json, const std::string& origin) {
+  return {.model = Get<std::string>(json, "model", origin),
+          .serial = Get<std::string>(json, "serial", origin),
+          .channels = Get<std::vector<std::string>>(json, "channels", origin),
+          .max_angle_rad = Get<double>(json, "max_angle_rad", origin)};
+}
+
+RigDescription RigOf(const SessionManifest& manifest,
+                     const std::filesystem::path& folder) {
+  return ParseRig(manifest.rig_text, folder / manifest.rig_file);
+}
+
+bool SamePicture(const ScheduledPicture& a, const ScheduledPicture& b) {
+  return a.target == b.target && a.pose == b.pose && a.channel == b.channel &&
+         a.group == b.group && a.repeat == b.repeat && a.exposure_us == b.exposure_us;
+}
+
+}  // namespace
+
+SessionManifest ReadManifest(const std::filesystem::path& folder) {
+  const std::filesystem::path path = folder / "session.json";
+  if (!std::filesystem::exists(path)) {
+    throw BadData(folder.string() + ": not a session folder: it has no session.json");
+  }
+  const std::string origin = path.string();
+  const Json json = ParseJson(ReadFile(path, kMaxManifestBytes), origin);
+  if (Get<std::string>(json, "format", origin) != kFormat) {
+    throw BadData(origin + ": not the manifest of a session");
+  }
+  if (const int version = Get<int>(json, "format_version", origin);
+      version != kFormatVersion) {
+    throw BadData(fmt::format(
+        "{}: format version {}; this build reads {}", origin, version, kFormatVersion));
+  }
+  SessionManifest manifest;
+  manifest.software_version = Get<std::string>(json, "software_version", origin);
+  manifest.rig_file = Get<std::string>(json, "rig_file", origin);
+  manifest.rig_hash = Get<std::string>(json, "rig_xxh3", origin);
+  manifest.rig_text = Get<std::string>(json, "rig", origin);
+  if (HashHex(manifest.rig_text.data(), manifest.rig_text.size()) !=
+      manifest.rig_hash) {
+    throw BadData(origin + ": field 'rig' doesn't match its checksum 'rig_xxh3'");
+  }
+  manifest.seed = Get<std::uint64_t>(json, "seed", origin);
+  manifest.picture_count = Get<std::int64_t>(json, "picture_count", origin);
+  manifest.camera = CameraFromJson(Get<Json>(json, "camera", origin), origin);
+  manifest.illuminator =
+      IlluminatorFromJson(Get<Json>(json, "illuminator", origin), origin);
+  const Json map = Get<Json>(json, "scan_map", origin);
+  if (!map.is_null()) {
+    manifest.scan_map = ScanMapFromJson(map, origin + ": scan_map");
+  }
+  return manifest;
+}
+
+void WriteManifest(const std::filesystem::path& folder,
+                   const SessionManifest& manifest) {
+  const Schedule schedule(RigOf(manifest, folder));
+  WriteJson(
+      folder / "session.json",
+      Json{{"format", kFormat},
+           {"format_version", kFormatVersion},
+           {"software_version", manifest.software_version},
+           {"rig_file", manifest.rig_file},
+           {"rig_xxh3", manifest.rig_hash},
+           {"rig", manifest.rig_text},
+           {"seed", manifest.seed},
+           {"picture_count", manifest.picture_count},
+           {"first_sample_picture", schedule.grid_begin()},
+           {"spot_groups", schedule.group_count()},
+           {"exposures_us", schedule.exposures_us()},
+           {"camera", ToJson(manifest.camera)},
+           {"illuminator", ToJson(manifest.illuminator)},
+           {"scan_map", manifest.scan_map ? ToJson(*manifest.scan_map) : Json()}});
+}
+
+SessionReader::SessionReader(std::filesystem::path folder)
+    : folder_(std::move(folder)),
+      manifest_(ReadManifest(folder_)),
+      rig_(RigOf(manifest_, folder_)),
+      schedule_(rig_) {
+  const std::filesystem::path path = folder_ / "journal";
+  journal_ = ParseJournal(ReadFile(path), path.string()).entries;
+  if (manifest_.picture_count != schedule_.size() ||
+      picture_count() > schedule_.size()) {
+    throw BadData(fmt::format(
+        "{}: {} pictures were scheduled and {} taken, but the rig description in it "
+        "calls for {}; it was captured by version {}, read it with that",
+        folder_.string(),
+        manifest_.picture_count,
+        picture_count(),
+        schedule_.size(),
+        manifest_.software_version));
+  }
+  for (const JournalEntry& entry : journal_) {
+    const ScheduledPicture& picture = schedule_[entry.number];
+    const auto group = picture.group >= 0 ? schedule_.Group(picture.group)
+                                          : std::span<const GridIndex>();
+    if (entry.file != FrameFileName(entry.number) ||
+        !SamePicture(entry.picture, picture) ||
+        !std::equal(
+            entry.spots.begin(), entry.spots.end(), group.begin(), group.end())) {
+      throw BadData(
+          fmt::format("{}:{}: picture {} isn't the one that the schedule calls for",
+                      path.string(),
+                      entry.number + 1,
+                      entry.number));
+    }
+  }
+}
+
+const JournalEntry& SessionReader::Entry(std::int64_t number) const {
+  Expect(number >= 0 && number < schedule_.size(), "a picture of the schedule");
+  if (number >= picture_count()) {
+    throw BadData(fmt::format(
+        "{}: picture {} of {} hasn't been taken; finish with nacre capture --resume",
+        folder_.string(),
+        number,
+        schedule_.size()));
+  }
+  return journal_[static_cast<std::size_t>(number)];
+}
+
+Frame SessionReader::ReadFrame(std::int64_t number) const {
+  const JournalEntry& entry = Entry(number);
+  const std::filesystem::path path = folder_ / entry.file;
+  const std::string bytes = ReadFile(path);
+  if (HashHex(bytes.data(), bytes.size()) != entry.hash) {
+    throw BadData(path.string() +
+                  ": doesn't match its checksum in the journal; it was damaged or "
+                  "changed after the capture");
+  }
+  Frame frame = DecodeFrame(bytes, path.string());
+  if (frame.width != manifest_.camera.width ||
+      frame.height != manifest_.camera.height) {
+    throw BadData(fmt::format("{}: {} x {} pixels, but the camera has {} x {}",
+                              path.string(),
+                              frame.width,
+                              frame.height,
+                              manifest_.camera.width,
+                              manifest_.camera.height));
+  }
+  frame.exposure_us = entry.exposure_us;
+  frame.frame_id = entry.frame_id;
+  frame.timestamp_ns = entry.timestamp_ns;
+  return frame;
+}
+
+}  // namespace nacre::acquire

@@ -1,0 +1,249 @@
+#include "acquire/session_writer.h"
+
+#include "acquire/frame_file.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "core/hash.h"
+#include "core/version.h"
+
+#include <algorithm>
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sstream>
+#include <unistd.h>
+
+namespace nacre::acquire {
+namespace {
+
+void MakeFolder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    throw Error(
+        fmt::format("cannot make the folder {}: {}", folder.string(), error.message()));
+  }
+}
+
+// The first line in which two texts differ, both versions of it.
+std::string FirstDifference(const std::string& before, const std::string& now) {
+  std::istringstream before_lines(before);
+  std::istringstream now_lines(now);
+  std::string a;
+  std::string b;
+  for (int line = 1;; ++line) {
+    const bool has_a = static_cast<bool>(std::getline(before_lines, a));
+    const bool has_b = static_cast<bool>(std::getline(now_lines, b));
+    if (!has_a && !has_b) {
+      return "only the ends of lines differ";
+    }
+    if (has_a != has_b || a != b) {
+      return fmt::format("line {} was '{}' and is '{}'",
+                         line,
+                         has_a ? a : "(no such line)",
+                         has_b ? b : "(no such line)");
+    }
+  }
+}
+
+void RequireSame(const std::filesystem::path& folder,
+                 const SessionManifest& before,
+                 const SessionManifest& now) {
+  const auto refuse = [&](const std::string& what) {
+    throw UsageError(
+        fmt::format("{}: can't resume: {}. Restore that, or capture into a new folder",
+                    folder.string(),
+                    what));
+  };
+  if (before.rig_text != now.rig_text) {
+    refuse(fmt::format("{} changed since the session began: {}",
+                       now.rig_file,
+                       FirstDifference(before.rig_text, now.rig_text)));
+  }
+  if (before.seed != now.seed) {
+    refuse(fmt::format("the seed was {} and is {}", before.seed, now.seed));
+  }
+  if (before.camera.model != now.camera.model ||
+      before.camera.serial != now.camera.serial ||
+      before.camera.width != now.camera.width ||
+      before.camera.height != now.camera.height ||
+      before.camera.bit_depth != now.camera.bit_depth) {
+    refuse(fmt::format("it was begun with the camera {} {} and this is {} {}",
+                       before.camera.model,
+                       before.camera.serial,
+                       now.camera.model,
+                       now.camera.serial));
+  }
+  if (before.illuminator.model != now.illuminator.model ||
+      before.illuminator.serial != now.illuminator.serial ||
+      before.illuminator.channels != now.illuminator.channels) {
+    refuse(fmt::format("it was begun with the laser {} {} and this is {} {}",
+                       before.illuminator.model,
+                       before.illuminator.serial,
+                       now.illuminator.model,
+                       now.illuminator.serial));
+  }
+  if (before.picture_count != now.picture_count) {
+    refuse(
+        fmt::format("it was begun by version {}, which schedules {} pictures for "
+                    "this rig instead of {}",
+                    before.software_version,
+                    before.picture_count,
+                    now.picture_count));
+  }
+}
+
+bool IsGoodFrame(const std::filesystem::path& folder, const JournalEntry& entry) {
+  const std::filesystem::path path = folder / entry.file;
+  return entry.file == FrameFileName(entry.number) &&
+         std::filesystem::is_regular_file(path) && HashFile(path) == entry.hash;
+}
+
+}  // namespace
+
+SessionManifest MakeManifest(const RigDescription& rig,
+                             const CameraInfo& camera,
+                             const IlluminatorInfo& illuminator,
+                             std::uint64_t seed) {
+  if (illuminator.channels != rig.scanner.channels) {
+    throw DeviceError(
+        fmt::format("{}: scanner.channels is [{}], but the laser {} has [{}]",
+                    rig.path.string(),
+                    fmt::join(rig.scanner.channels, ", "),
+                    illuminator.model,
+                    fmt::join(illuminator.channels, ", ")));
+  }
+  return {.rig_text = rig.text,
+          .rig_hash = rig.hash,
+          .rig_file = rig.path.filename().string(),
+          .camera = camera,
+          .illuminator = illuminator,
+          .picture_count = Schedule(rig).size(),
+          .scan_map = std::nullopt,
+          .seed = seed,
+          .software_version = Version()};
+}
+
+SessionWriter::SessionWriter(const std::filesystem::path& folder,
+                             const SessionManifest& manifest,
+                             bool durable)
+    : folder_(folder),
+      lock_(std::make_unique<SessionLock>(folder)),
+      manifest_(manifest),
+      rig_(ParseRig(manifest.rig_text, folder / manifest.rig_file)),
+      schedule_(rig_),
+      durable_(durable) {}
+
+SessionWriter SessionWriter::Create(const std::filesystem::path& folder,
+                                    const SessionManifest& manifest,
+                                    bool durable) {
+  MakeFolder(folder / "frames");
+  SessionWriter writer(folder, manifest, durable);
+  if (std::filesystem::exists(folder / "session.json")) {
+    throw UsageError(folder.string() +
+                     ": there is a session already; --resume goes on with it");
+  }
+  // The manifest comes last: a folder without one is no session and may be begun again.
+  writer.journal_ = std::make_unique<JournalWriter>(folder / "journal", 0);
+  WriteManifest(folder, manifest);
+  return writer;
+}
+
+SessionWriter SessionWriter::Resume(const std::filesystem::path& folder,
+                                    const SessionManifest& manifest,
+                                    bool durable,
+                                    const ProgressFunction& progress) {
+  SessionManifest found = ReadManifest(folder);
+  RequireSame(folder, found, manifest);
+  SessionWriter writer(folder, found, durable);
+  const std::filesystem::path path = folder / "journal";
+  Journal journal = ParseJournal(ReadFile(path), path.string());
+  writer.VerifyFrames(journal, progress);
+  writer.journal_ = std::make_unique<JournalWriter>(path, journal.good_bytes);
+  writer.picture_count_ = std::ssize(journal.entries);
+  return writer;
+}
+
+void SessionWriter::VerifyFrames(Journal& journal, const ProgressFunction& progress) {
+  const std::int64_t total = std::ssize(journal.entries);
+  std::uint64_t good_bytes = 0;
+  for (std::int64_t k = 0; k < total; ++k) {
+    const JournalEntry& entry = journal.entries[static_cast<std::size_t>(k)];
+    if (!IsGoodFrame(folder_, entry)) {
+      dropped_count_ = total - k;
+      journal.entries.resize(static_cast<std::size_t>(k));
+      journal.good_bytes = good_bytes;
+      return;
+    }
+    good_bytes += FormatJournalLine(entry).size();
+    Report(progress, {.stage = "verify", .done = k + 1, .total = total, .note = ""});
+  }
+}
+
+void SessionWriter::Append(const Frame& frame) {
+  Expect(picture_count_ < schedule_.size(), "a picture that is scheduled");
+  const CameraInfo& camera = manifest_.camera;
+  const std::size_t pixel_count =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  if (frame.width != camera.width || frame.height != camera.height ||
+      frame.counts.size() != pixel_count) {
+    throw DeviceError(fmt::format(
+        "picture {}: the camera {} announced {} x {} pixels and delivered {} x {} ({})",
+        picture_count_,
+        camera.model,
+        camera.width,
+        camera.height,
+        frame.width,
+        frame.height,
+        frame.counts.size()));
+  }
+  const auto largest = *std::max_element(frame.counts.begin(), frame.counts.end());
+  if (largest >= 1 << camera.bit_depth) {
+    throw DeviceError(fmt::format("picture {}: a count of {} from a camera of {} bits",
+                                  picture_count_,
+                                  largest,
+                                  camera.bit_depth));
+  }
+  const std::string bytes = EncodeFrame(frame, camera.bit_depth);
+  JournalEntry entry;
+  entry.number = picture_count_;
+  entry.picture = schedule_[picture_count_];
+  if (entry.picture.group >= 0) {
+    const auto group = schedule_.Group(entry.picture.group);
+    entry.spots.assign(group.begin(), group.end());
+  }
+  entry.exposure_us = frame.exposure_us;
+  entry.file = FrameFileName(picture_count_);
+  entry.hash = HashHex(bytes.data(), bytes.size());
+  entry.frame_id = frame.frame_id;
+  entry.timestamp_ns = frame.timestamp_ns;
+  WriteFrameFile(folder_ / entry.file, bytes, durable_);
+  journal_->Append(entry);
+  if (durable_) {
+    journal_->Flush();
+  }
+  ++picture_count_;
+}
+
+void SessionWriter::SetScanMap(const ScanMap& map) {
+  if (manifest_.scan_map) {
+    Expect(*manifest_.scan_map == map, "one laser map a session");
+    return;
+  }
+  manifest_.scan_map = map;
+  WriteManifest(folder_, manifest_);
+}
+
+void SessionWriter::Flush() {
+  // One call for all the frames of a session instead of one for each.
+  const int fd = ::open(folder_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const bool failed = fd < 0 || ::syncfs(fd) != 0;
+  const Error error = SystemError("cannot flush " + folder_.string());
+  if (fd >= 0) {
+    ::close(fd);
+  }
+  if (failed) {
+    throw error;
+  }
+}
+
+}  // namespace nacre::acquire
