@@ -14,10 +14,6 @@
 namespace nacre::render {
 namespace {
 
-ColorLanes ToLanes(Color c) {
-  return {{c.x, c.y, c.z, 0}};
-}
-
 class DipoleGather final : public Subsurface {
  public:
   DipoleGather(const std::array<DipoleProfile, 3>& profiles,

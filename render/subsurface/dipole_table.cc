@@ -35,10 +35,6 @@ double Reach(const DipoleProfile& profile) {
   return decay * end > kEndDecay ? kEndDecay / decay : end;
 }
 
-float Mix(float a, float b, float fraction) {
-  return a + fraction * (b - a);
-}
-
 }  // namespace
 
 SquaredDistanceAxis::SquaredDistanceAxis(double r_min_mm, double r_max_mm) {
@@ -121,11 +117,9 @@ void DipoleTable::AddDisc(float r2_mm2,
   const float row_fraction = disc - static_cast<float>(row);
   const ColorLanes* lower = &near_[std::size_t{row} * near_axis_.size() + place.index];
   const ColorLanes* upper = lower + near_axis_.size();
-  for (std::size_t c = 0; c < 4; ++c) {
-    const float a = Mix(lower[0].v[c], lower[1].v[c], place.fraction);
-    const float b = Mix(upper[0].v[c], upper[1].v[c], place.fraction);
-    sum.v[c] += flux.v[c] * Mix(a, b, row_fraction);
-  }
+  sum += flux * Mix(Mix(lower[0], lower[1], place.fraction),
+                    Mix(upper[0], upper[1], place.fraction),
+                    row_fraction);
 }
 
 void DipoleTable::AddFar(float r2_mm2,
@@ -135,12 +129,9 @@ void DipoleTable::AddFar(float r2_mm2,
   const auto place = far_axis_.Find(r2_mm2);
   const FarEntry& a = far_[place.index];
   const FarEntry& b = far_[place.index + 1];
-  for (std::size_t c = 0; c < 4; ++c) {
-    const float rd = Mix(a.rd.v[c], b.rd.v[c], place.fraction);
-    const float half_laplacian =
-        Mix(a.half_laplacian.v[c], b.half_laplacian.v[c], place.fraction);
-    sum.v[c] += flux.v[c] * (rd + variance_mm2 * half_laplacian);
-  }
+  sum +=
+      flux * (Mix(a.rd, b.rd, place.fraction) +
+              Mix(a.half_laplacian, b.half_laplacian, place.fraction) * variance_mm2);
 }
 
 }  // namespace nacre::render

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "render/subsurface/color_lanes.h"
 #include "render/subsurface/dipole_profile.h"
 
 #include <array>
@@ -8,11 +9,6 @@
 #include <vector>
 
 namespace nacre::render {
-
-/// R, G, B and one unused lane, so that a colour is one register.
-struct alignas(16) ColorLanes {
-  std::array<float, 4> v{};
-};
 
 /// Places on the axis of squared distances: 32 to the octave, taken from the bits of
 /// the float itself, so that finding one takes no logarithm.

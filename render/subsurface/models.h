@@ -43,7 +43,9 @@ std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parame
 
 struct FactoredOptions {
   double patches_per_pitch = 2;  ///< patch side = pitch / this
-  double window_cache_mb = 256;  ///< evaluated windows kept, at most
+  /// As for the dipole; clusters are used from a few pitches on.
+  double max_relative_extent = 0.35;
+  double window_cache_mb = 256;  ///< for evaluated windows, at most
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -51,10 +53,14 @@ struct FactoredOptions {
           self.patches_per_pitch,
           Range{0.5, 8},
           "patches along one pitch of the material");
+    visit("max_relative_extent",
+          self.max_relative_extent,
+          Range{0, 1},
+          "cluster diameter / distance below which a cluster is one source");
     visit("window_cache_mb",
           self.window_cache_mb,
           Range{0, 65536},
-          "memory for evaluated windows; beyond it they are evaluated again");
+          "memory for evaluated windows; those beyond it cost time");
   }
 };
 

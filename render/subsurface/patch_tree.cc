@@ -42,7 +42,6 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
                     static_cast<float>(centre[1] / weight_sum),
                     static_cast<float>(centre[2] / weight_sum)};
   double variance = 0;
-  float radius2 = 0;
   for (std::int32_t p = begin; p < end; ++p) {
     const Patch& patch = patches[static_cast<std::size_t>(p)];
     const Vec3 d = patch.point.position_mm - node.centre_mm;
@@ -50,10 +49,9 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
         Dot(patch.axis_a_mm, patch.axis_a_mm) + Dot(patch.axis_b_mm, patch.axis_b_mm);
     const float weight = patch.flux_w.x + patch.flux_w.y + patch.flux_w.z;
     variance += static_cast<double>(weight * 0.5F * (Dot(d, d) + own));
-    radius2 = std::max(radius2, Dot(d, d));
+    node.radius_mm = std::max(node.radius_mm, Length(d) + Length(patch.axis_a_mm));
   }
   node.variance_mm2 = static_cast<float>(variance / weight_sum);
-  node.radius_mm = std::sqrt(radius2);
   return node;
 }
 

@@ -13,7 +13,7 @@ class PatchTree {
  public:
   struct Node {
     Vec3 centre_mm;          ///< weighted by flux
-    float radius_mm = 0;     ///< of the sphere around the centre with all its patches
+    float radius_mm = 0;     ///< around the centre, that its patches reach
     Color flux_w;            ///< sum over its patches
     float variance_mm2 = 0;  ///< of the flux along one direction in the surface
     std::int32_t begin = 0;  ///< its patches
