@@ -97,7 +97,7 @@ void Say(const Common& common, const std::string& line) {
 }
 
 void Print(const Common& common, const Json& json, const std::string& text) {
-  std::cout << (common.json ? json.dump() : text) << '\n' << std::flush;
+  *common.out << (common.json ? json.dump() : text) << '\n' << std::flush;
 }
 
 ProgressFunction ConsoleProgress(const Common& common) {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <fmt/format.h>
 #include <functional>
+#include <iosfwd>
 #include <string>
 
 namespace nacre::cli {
@@ -19,6 +20,8 @@ struct Common {
   int verbosity = 1;     ///< 0 quiet, 1 normal, 2 and more talkative
   int thread_count = 0;  ///< 0: all cores
   std::uint64_t seed = 1;
+  std::ostream* out =
+      nullptr;  ///< where results go: stdout, or the verb that called this one
 };
 
 /// A verb: adds its options to its subcommand and returns what to run once the command

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <iosfwd>
+#include <string>
+#include <vector>
+
+namespace nacre::cli {
+
+/// Parses and runs one command line, without the program's name: {"factor", "x.rd.exr",
+/// …}. Results go to `out`. Returns the exit code of usage errors and --help; anything
+/// else that goes wrong is thrown.
+int RunCommand(const std::vector<std::string>& arguments, std::ostream& out);
+
+}  // namespace nacre::cli
