@@ -1,0 +1,109 @@
+#pragma once
+
+#include "core/options.h"
+#include "core/progress.h"
+#include "factor/material.h"
+#include "reconstruct/rd_dataset.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace nacre::factor {
+
+/// How a dataset is factored. `thread_count` and `seed` aren't listed in Visit: every
+/// verb has them.
+struct FactorOptions {
+  std::string method = "log-svd";
+  int terms = 10;
+  int clusters = 1;
+  double bytes = 0;
+  double error = 0;
+  double log_weight = 0;
+  int sample_rows = 512;
+  int fill_rounds = 2;
+
+  int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
+  std::uint64_t seed = 1;  ///< of the sample of rows and of the clustering
+
+  template <class Self, class Visitor>
+  static void Visit(Self& self, Visitor&& visit) {
+    visit("method", self.method, Range{}, "log-svd or svd");
+    visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
+    visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
+    visit("bytes", self.bytes, Range{0}, "fewer terms, to fit this size; 0: no limit");
+    visit("error",
+          self.error,
+          Range{0, 1},
+          "as few terms as keep this relative L2 error; 0: all terms");
+    visit("log_weight",
+          self.log_weight,
+          Range{0, 100},
+          "weight of the log error where A and B are chosen; 0: error in R_d alone");
+    visit("sample_rows",
+          self.sample_rows,
+          Range{8, 1e6},
+          "slices that A and B are tried on");
+    visit("fill_rounds",
+          self.fill_rounds,
+          Range{0, 20},
+          "times that missing values are predicted and fitted again");
+  }
+};
+
+/// Names that FactorOptions::method may take.
+const std::vector<std::string>& FactorMethods();
+
+/// What was done and how good it is. Errors are over the valid measurements, all
+/// channels together, after rounding to floats and with each slice's total corrected.
+struct FactorSummary {
+  std::int64_t bytes = 0;          ///< Material::StorageBytes
+  std::int64_t dataset_bytes = 0;  ///< the measurements as 32-bit floats
+  int terms = 0;                   ///< as stored, at most the option's
+  int clusters = 0;
+  std::vector<double> a;  ///< a channel; empty for the linear model
+  std::vector<double> b;
+  double relative_l2 = 0;     ///< √(Σ e² / Σ R²)
+  double rmse_over_mean = 0;  ///< RMSE in R_d over the mean R_d
+  double log_rms = 0;         ///< rms of ln(model / measured) above 1e-5 of the peak
+  double psnr_db = 0;         ///< 20 log10(peak / RMSE)
+  double peak = 0;            ///< largest measurement, mm⁻²
+  double worst_slice = 0;     ///< largest relative L2 error of a slice
+  int worst_slice_i = 0;
+  int worst_slice_j = 0;
+  double worst_total =
+      0;  ///< largest |Σ model / Σ measured − 1| of a slice and channel
+  double missing_fraction = 0;    ///< of all cells: invalid, filled by the model
+  std::int64_t unfit_slices = 0;  ///< model or measured total not positive: not scaled
+  std::vector<TermsError> error_curve;
+  int passes = 0;                  ///< times that all slices were read
+  int search_steps = 0;            ///< pairs (A, B) tried, all channels
+  std::int64_t working_bytes = 0;  ///< estimated, beside dataset and material
+  double cpu_seconds = 0;          ///< of the whole process while factoring
+  double seconds = 0;
+  std::vector<std::string> notes;  ///< what a person should know
+
+  std::string Brief() const;  ///< one line
+  Json ToJson() const;
+};
+
+struct Factorization {
+  Material material;
+  FactorSummary summary;
+};
+
+/// Factors a dataset, in memory or streamed from its file (read four times: scan, sums,
+/// projection and a few slices between; twice more if values are missing). Streaming
+/// holds 512 slices and, a channel and cluster, 8 core⁴ bytes. The same data, options
+/// and seed give the same bits whatever the thread count.
+///
+/// Throws a usage Error for an unknown method or an option out of range; BadData naming
+/// slice, channel and cell for a value that isn't finite; Interrupted.
+Factorization Factor(const reconstruct::RdDataset& dataset,
+                     const FactorOptions& options,
+                     const ProgressFunction& progress = {});
+Factorization Factor(reconstruct::RdReader& reader,
+                     const FactorOptions& options,
+                     const ProgressFunction& progress = {});
+
+}  // namespace nacre::factor

@@ -1,0 +1,274 @@
+// The SVD model of [Kurt14; Önel14, sec. 4.3]: R'_d is transformed, cut after S terms
+// of its singular value decomposition, a channel at a time. Where the thesis takes the
+// terms one by one from the residual, all S come from one decomposition here, which is
+// the same by Eckart and Young's theorem.
+
+#include "factor/internal/log_svd.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace nacre::factor::internal {
+namespace {
+
+constexpr Eigen::Index kPanelColumns = 64;
+
+// A block's rows of one channel, transformed, one matrix a cluster.
+using ClusterRows = std::vector<RowMatrix>;
+
+class GramPass {
+ public:
+  GramPass(SliceSource& source, const SvdFitOptions& options, const SvdModel& model)
+      : source_(source),
+        options_(options),
+        model_(model),
+        window_(source.header().WindowSize()),
+        sums_(model.scans.size() * static_cast<std::size_t>(options.cluster_count),
+              GramSum(window_)),
+        missing_(model.scans.size(), 0) {}
+
+  // Returns whether some value was missing.
+  bool Run(const ProgressFunction& progress, const std::string& note) {
+    const std::int64_t points = source_.header().PointCount();
+    for (std::int64_t first = 0; first < points; first += kBlockRows) {
+      Report(progress, {"factor", first, points, note});
+      AddBlock(source_.Read(first, std::min(kBlockRows, points - first)));
+    }
+    return std::any_of(missing_.begin(), missing_.end(), [](int n) { return n > 0; });
+  }
+
+  const std::vector<GramSum>& sums() const { return sums_; }
+
+ private:
+  void AddBlock(const SliceBlock& block) {
+    const auto channels = static_cast<std::int64_t>(model_.scans.size());
+    std::vector<ClusterRows> rows(model_.scans.size());
+    for (std::size_t c = 0; c < rows.size(); ++c) {
+      Transform(block, c, rows[c]);
+    }
+    const std::int64_t clusters = options_.cluster_count;
+    const std::int64_t panels = (window_ + kPanelColumns - 1) / kPanelColumns;
+    ParallelFor(
+        channels * clusters * panels, options_.thread_count, [&](std::int64_t t) {
+          const auto sum_index = static_cast<std::size_t>(t / panels);
+          const RowMatrix& y = rows[sum_index / static_cast<std::size_t>(clusters)]
+                                   [sum_index % static_cast<std::size_t>(clusters)];
+          if (y.rows() > 0) {
+            const Eigen::Index first = (t % panels) * kPanelColumns;
+            sums_[sum_index].AddPanel(
+                y, first, std::min(kPanelColumns, window_ - first));
+          }
+        });
+  }
+
+  void Transform(const SliceBlock& block, std::size_t channel, ClusterRows& rows) {
+    // Rows of a cluster keep their order.
+    std::vector<Eigen::Index> count(static_cast<std::size_t>(options_.cluster_count),
+                                    0);
+    std::vector<Eigen::Index> place(static_cast<std::size_t>(block.count));
+    for (std::int64_t row = 0; row < block.count; ++row) {
+      place[static_cast<std::size_t>(row)] = count[ClusterOf(block, row)]++;
+    }
+    for (const Eigen::Index n : count) {
+      rows.emplace_back(n, window_);
+    }
+    std::vector<int> missing(static_cast<std::size_t>(block.count), 0);
+    ParallelFor(block.count, options_.thread_count, [&](std::int64_t row) {
+      const auto r = static_cast<std::size_t>(row);
+      RowMatrix& y = rows[ClusterOf(block, row)];
+      missing[r] = TransformOne(block, row, channel, &y(place[r], 0));
+    });
+    for (const int n : missing) {
+      missing_[channel] = std::max(missing_[channel], n);
+    }
+  }
+
+  std::size_t ClusterOf(const SliceBlock& block, std::int64_t row) const {
+    return model_.cluster[static_cast<std::size_t>(block.first + row)];
+  }
+
+  int TransformOne(const SliceBlock& block,
+                   std::int64_t row,
+                   std::size_t channel,
+                   double* values) const {
+    const auto window = static_cast<std::size_t>(window_);
+    const auto offset =
+        static_cast<std::size_t>(row * source_.header().SliceSize()) + channel * window;
+    const std::span<const std::uint8_t> valid(block.valid + offset, window);
+    const std::span<double> y(values, window);
+    const RowTransform& transform = model_.transforms[channel];
+    const ChannelScan& scan = model_.scans[channel];
+    const int missing =
+        TransformRow({block.rd + offset, window}, valid, scan, transform, y);
+    if (missing > 0 && !model_.bases.empty()) {
+      const RowBasis& basis = model_.Basis(channel, block.first + row);
+      const Eigen::VectorXd predicted =
+          basis.vectors * basis.PartialCoordinates(y, valid);
+      // Predictions stay within what was measured anywhere in the channel.
+      const double low = transform.Forward(std::min(0.0, scan.least));
+      const double high = transform.Forward(std::max(0.0, scan.peak));
+      for (std::size_t cell = 0; cell < window; ++cell) {
+        if (valid[cell] == 0) {
+          y[cell] = std::clamp(predicted(static_cast<Eigen::Index>(cell)), low, high);
+        }
+      }
+    }
+    return missing;
+  }
+
+  SliceSource& source_;
+  const SvdFitOptions& options_;
+  const SvdModel& model_;
+  Eigen::Index window_;
+  std::vector<GramSum> sums_;
+  std::vector<int> missing_;
+};
+
+}  // namespace
+
+void FitSvd(SliceSource& source,
+            const SvdFitOptions& options,
+            SvdModel& model,
+            const ProgressFunction& progress) {
+  for (int round = 0; round <= options.fill_rounds; ++round) {
+    GramPass pass(source, options, model);
+    const bool has_missing = pass.Run(progress, round == 0 ? "sums" : "missing values");
+    ++model.passes;
+    std::vector<RowBasis> bases(pass.sums().size());
+    ParallelFor(static_cast<std::int64_t>(bases.size()),
+                options.thread_count,
+                [&](std::int64_t n) {
+                  const auto k = static_cast<std::size_t>(n);
+                  bases[k] = BasisOf(pass.sums()[k], options.terms);
+                });
+    model.bases = std::move(bases);
+    if (!has_missing) {
+      break;
+    }
+  }
+}
+
+int TransformRow(std::span<const float> rd,
+                 std::span<const std::uint8_t> valid,
+                 const ChannelScan& scan,
+                 const RowTransform& transform,
+                 std::span<double> row) {
+  const int missing = FillRow(rd, valid, scan, row);
+  for (double& value : row) {
+    value = transform.Forward(value);
+  }
+  return missing;
+}
+
+Eigen::VectorXd RowCoordinates(const RowBasis& basis,
+                               std::span<const double> row,
+                               std::span<const std::uint8_t> valid,
+                               int missing) {
+  return missing == 0 ? basis.Coordinates(row) : basis.PartialCoordinates(row, valid);
+}
+
+Material ToMaterial(const SvdModel& model,
+                    const reconstruct::RdHeader& header,
+                    int terms) {
+  const std::size_t channels = header.channels.size();
+  const auto points = static_cast<std::size_t>(header.PointCount());
+  const auto window = static_cast<std::size_t>(header.WindowSize());
+  Material m;
+  m.points_x = header.points_x;
+  m.points_y = header.points_y;
+  m.core = header.core;
+  m.pitch_mm = header.pitch_mm;
+  m.eta = header.eta;
+  m.channels = header.channels;
+  m.transform = model.transforms[0].is_log ? Transform::kLog : Transform::kLinear;
+  m.terms = terms;
+  m.cluster_count = model.cluster_count;
+  m.cluster = model.cluster;
+  m.f.assign(channels * static_cast<std::size_t>(terms) * points, 0.0F);
+  m.h.assign(model.bases.size() * static_cast<std::size_t>(terms) * window, 0.0F);
+  m.row_scale.assign(channels * points, 1.0F);
+  m.albedo.assign(channels * points, 0.0F);
+  const auto clusters = static_cast<std::size_t>(model.cluster_count);
+  for (std::size_t c = 0; c < channels; ++c) {
+    const RowTransform& transform = model.transforms[c];
+    m.a.push_back(transform.is_log ? transform.a : 1);
+    m.b.push_back(transform.is_log ? transform.b : 1);
+    for (std::size_t k = 0; k < clusters; ++k) {
+      const RowBasis& basis = model.bases[c * clusters + k];
+      const double scale = (transform.is_log ? 1 : transform.a) /
+                           std::sqrt(static_cast<double>(basis.rows));
+      for (Eigen::Index j = 0; j < std::min<Eigen::Index>(terms, basis.rank()); ++j) {
+        const std::size_t at = ((c * clusters + k) * static_cast<std::size_t>(terms) +
+                                static_cast<std::size_t>(j)) *
+                               window;
+        for (std::size_t cell = 0; cell < window; ++cell) {
+          m.h[at + cell] =
+              static_cast<float>(basis.vectors(static_cast<Eigen::Index>(cell), j) *
+                                 basis.sigma(j) * scale);
+        }
+      }
+    }
+  }
+  return m;
+}
+
+double TotalScale(std::span<const float> rd,
+                  std::span<const std::uint8_t> valid,
+                  std::span<const float> modelled) {
+  double measured_total = 0;
+  double modelled_total = 0;
+  for (std::size_t cell = 0; cell < rd.size(); ++cell) {
+    if (valid[cell] != 0) {
+      measured_total += static_cast<double>(rd[cell]);
+      modelled_total += static_cast<double>(modelled[cell]);
+    }
+  }
+  return modelled_total > 0 ? std::max(0.0, measured_total / modelled_total) : 1;
+}
+
+void ProjectSlice(const SvdModel& model,
+                  const SliceBlock& block,
+                  std::int64_t row,
+                  std::size_t channel,
+                  Material& material,
+                  std::vector<float>& window) {
+  const auto size = static_cast<std::size_t>(material.WindowSize());
+  const auto offset =
+      (static_cast<std::size_t>(row) * material.channels.size() + channel) * size;
+  const std::span<const float> rd(block.rd + offset, size);
+  const std::span<const std::uint8_t> valid(block.valid + offset, size);
+  const std::int64_t point = block.first + row;
+  const RowBasis& basis = model.Basis(channel, point);
+
+  std::vector<double> y(size);
+  const int missing =
+      TransformRow(rd, valid, model.scans[channel], model.transforms[channel], y);
+  const Eigen::VectorXd coordinates = RowCoordinates(basis, y, valid, missing);
+  const auto c = static_cast<int>(channel);
+  const double root_rows = std::sqrt(static_cast<double>(basis.rows));
+  for (int j = 0; j < std::min(material.terms, static_cast<int>(basis.rank())); ++j) {
+    material.f[static_cast<std::size_t>(
+        (std::int64_t{c} * material.terms + j) * material.PointCount() + point)] =
+        static_cast<float>(coordinates(j) / basis.sigma(j) * root_rows);
+  }
+
+  window.resize(size);
+  const auto i = static_cast<int>(point % material.points_x);
+  const auto j = static_cast<int>(point / material.points_x);
+  material.EvaluateTerms(c, i, j, material.terms, window.data());
+  const double scale = TotalScale(rd, valid, window);
+  const double all = std::accumulate(window.begin(), window.end(), 0.0);
+  const auto at =
+      static_cast<std::size_t>(std::int64_t{c} * material.PointCount() + point);
+  material.row_scale[at] = static_cast<float>(scale);
+  material.albedo[at] =
+      static_cast<float>(scale * all * material.pitch_mm * material.pitch_mm);
+  for (float& value : window) {
+    value *= material.row_scale[at];
+  }
+}
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,87 @@
+#pragma once
+
+#include "core/progress.h"
+#include "factor/internal/mean_slice.h"
+#include "factor/internal/row_basis.h"
+#include "factor/internal/row_transform.h"
+#include "factor/material.h"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace nacre::factor::internal {
+
+/// What FitSvd needs to know beside the data.
+struct SvdFitOptions {
+  int terms = 10;
+  int cluster_count = 1;
+  int fill_rounds = 2;  ///< times that missing values are predicted and fitted again
+  int thread_count = 0;
+};
+
+/// The thesis' model before it becomes a Material: a transform a channel and a basis of
+/// rows a channel and cluster.
+struct SvdModel {
+  std::vector<RowTransform> transforms;  ///< [channel]
+  std::vector<RowBasis> bases;           ///< [channel][cluster]
+  std::vector<ChannelScan> scans;        ///< [channel]
+  std::vector<std::uint8_t> cluster;     ///< [point]
+  int cluster_count = 1;
+  int passes = 0;  ///< times that all slices were read
+
+  const RowBasis& Basis(std::size_t channel, std::int64_t point) const {
+    return bases[channel * static_cast<std::size_t>(cluster_count) +
+                 cluster[static_cast<std::size_t>(point)]];
+  }
+};
+
+/// Truncated SVD of every channel's (and cluster's) matrix of transformed rows, in one
+/// pass over the slices, plus `fill_rounds` more if values are missing. The singular
+/// vectors are the eigenvectors of YᵀY, core² × core², which is all that is kept of the
+/// pass: 8 core⁴ bytes a channel and cluster.
+///
+/// `model` comes with everything but `bases` and `passes`.
+void FitSvd(SliceSource& source,
+            const SvdFitOptions& options,
+            SvdModel& model,
+            const ProgressFunction& progress);
+
+/// The transformed row, missing values filled: from the mean slice, or, given a basis,
+/// by the model's own prediction. Returns the number of missing values.
+int TransformRow(std::span<const float> rd,
+                 std::span<const std::uint8_t> valid,
+                 const ChannelScan& scan,
+                 const RowTransform& transform,
+                 std::span<double> row);
+
+/// The coordinates of a row in `basis`, from its valid cells if some are missing.
+Eigen::VectorXd RowCoordinates(const RowBasis& basis,
+                               std::span<const double> row,
+                               std::span<const std::uint8_t> valid,
+                               int missing);
+
+/// Kernels and transform attributes as a Material keeps them; its f, row_scale and
+/// albedo are sized and zero. f_j gets a root mean square of 1 over the rows, h_j takes
+/// the singular value; the linear model's scale goes into h too.
+Material ToMaterial(const SvdModel& model,
+                    const reconstruct::RdHeader& header,
+                    int terms);
+
+/// What a modelled slice is multiplied by for its total over the measured cells to be
+/// the measured one: 1 where the model is zero, 0 where the measured total is negative.
+double TotalScale(std::span<const float> rd,
+                  std::span<const std::uint8_t> valid,
+                  std::span<const float> modelled);
+
+/// Projects one slice of one channel and stores f, row_scale (which makes the total
+/// over the measured cells exact) and albedo. `window` is scratch for core² floats and
+/// returns the model's slice.
+void ProjectSlice(const SvdModel& model,
+                  const SliceBlock& block,
+                  std::int64_t row,
+                  std::size_t channel,
+                  Material& material,
+                  std::vector<float>& window);
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,34 @@
+#pragma once
+
+#include "reconstruct/rd_dataset.h"
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace nacre::factor::internal {
+
+/// Consecutive slices, laid out as in reconstruct::RdDataset.
+struct SliceBlock {
+  std::int64_t first = 0;
+  std::int64_t count = 0;
+  const float* rd = nullptr;
+  const std::uint8_t* valid = nullptr;
+};
+
+/// A dataset read front to back as often as needed, a block at a time.
+class SliceSource {
+ public:
+  virtual ~SliceSource() = default;
+  virtual const reconstruct::RdHeader& header() const = 0;
+  /// The block stays valid until the next call.
+  virtual SliceBlock Read(std::int64_t first, std::int64_t count) = 0;
+};
+
+/// Slices of a dataset in memory. Throws BadData naming the value if a size is wrong.
+std::unique_ptr<SliceSource> SourceOf(const reconstruct::RdDataset& dataset);
+
+/// Slices of a file: one block in memory, every pass reads the file again.
+std::unique_ptr<SliceSource> SourceOf(reconstruct::RdReader& reader);
+
+}  // namespace nacre::factor::internal

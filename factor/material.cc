@@ -1,0 +1,147 @@
+#include "factor/material.h"
+
+#include "core/error.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace nacre::factor {
+namespace {
+
+// s = Σ_j f_j h_j to R_d, in double: exp of a sum of floats keeps a float's precision.
+double Undo(const Material& material, int channel, double s) {
+  if (material.transform == Transform::kLinear) {
+    return s;
+  }
+  const auto c = static_cast<std::size_t>(channel);
+  // A (exp(s) − B) as A B expm1(s − ln B), which stays exact towards R_d = 0.
+  return material.a[c] * material.b[c] * std::expm1(s - std::log(material.b[c]));
+}
+
+class Checker {
+ public:
+  explicit Checker(const std::string& origin) : origin_(origin) {}
+
+  void Require(bool condition, const std::string& field, const std::string& found) {
+    if (!condition) {
+      throw BadData(fmt::format("{}: material: {}: {}", origin_, field, found));
+    }
+  }
+
+  template <class T>
+  void Size(const std::vector<T>& values, std::int64_t expected, const char* field) {
+    Require(static_cast<std::int64_t>(values.size()) == expected,
+            field,
+            fmt::format("{} values where {} are expected", values.size(), expected));
+  }
+
+  template <class T>
+  void Values(const std::vector<T>& values, double min, const char* field) {
+    for (std::size_t n = 0; n < values.size(); ++n) {
+      const auto value = static_cast<double>(values[n]);
+      if (!std::isfinite(value) || value < min) {
+        Require(false, field, fmt::format("value {} is {}", n, value));
+      }
+    }
+  }
+
+ private:
+  const std::string& origin_;
+};
+
+}  // namespace
+
+const char* Name(Transform transform) {
+  return transform == Transform::kLog ? "log" : "linear";
+}
+
+float Material::Evaluate(int channel, int i, int j, int u, int v) const {
+  const std::int64_t point = std::int64_t{j} * points_x + i;
+  const std::int64_t cell = std::int64_t{v} * core + u;
+  const int k = cluster.empty() ? 0 : cluster[static_cast<std::size_t>(point)];
+  double s = 0;
+  for (int term = 0; term < terms; ++term) {
+    s += static_cast<double>(FactorMap(channel, term)[point]) *
+         static_cast<double>(Kernel(channel, k, term)[cell]);
+  }
+  return static_cast<float>(std::max(0.0, Undo(*this, channel, s))) *
+         row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
+}
+
+void Material::EvaluateWindow(int channel, int i, int j, float* window) const {
+  EvaluateTerms(channel, i, j, terms, window);
+  const std::int64_t point = std::int64_t{j} * points_x + i;
+  const float scale =
+      row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
+  for (std::int64_t cell = 0; cell < WindowSize(); ++cell) {
+    window[cell] *= scale;
+  }
+}
+
+void Material::EvaluateTerms(
+    int channel, int i, int j, int term_count, float* window) const {
+  const std::int64_t point = std::int64_t{j} * points_x + i;
+  const int k = cluster.empty() ? 0 : cluster[static_cast<std::size_t>(point)];
+  std::vector<double> sum(static_cast<std::size_t>(WindowSize()), 0.0);
+  for (int term = 0; term < term_count; ++term) {
+    const auto weight = static_cast<double>(FactorMap(channel, term)[point]);
+    const float* kernel = Kernel(channel, k, term);
+    for (std::size_t cell = 0; cell < sum.size(); ++cell) {
+      sum[cell] += weight * static_cast<double>(kernel[cell]);
+    }
+  }
+  for (std::size_t cell = 0; cell < sum.size(); ++cell) {
+    window[cell] = static_cast<float>(std::max(0.0, Undo(*this, channel, sum[cell])));
+  }
+}
+
+std::int64_t Material::StorageBytes() const {
+  return static_cast<std::int64_t>(sizeof(float) *
+                                       (f.size() + h.size() + row_scale.size()) +
+                                   (cluster_count > 1 ? cluster.size() : 0));
+}
+
+void Validate(const Material& m, const std::string& origin) {
+  Checker check(origin);
+  const auto positive = [&](double value, const char* field) {
+    check.Require(value > 0 && std::isfinite(value), field, fmt::format("{}", value));
+  };
+  positive(m.points_x, "points_x");
+  positive(m.points_y, "points_y");
+  positive(m.pitch_mm, "pitch_mm");
+  positive(m.eta, "eta");
+  check.Require(m.core > 0 && m.core % 2 == 1, "core", fmt::format("{}", m.core));
+  check.Require(!m.channels.empty(), "channels", "there is none");
+  check.Require(m.terms >= 1, "terms", fmt::format("{}", m.terms));
+  check.Require(m.cluster_count >= 1 && m.cluster_count <= 256,
+                "cluster_count",
+                fmt::format("{}", m.cluster_count));
+  const auto channels = static_cast<std::int64_t>(m.channels.size());
+  check.Size(m.a, channels, "a");
+  check.Size(m.b, channels, "b");
+  for (std::size_t c = 0; c < m.channels.size(); ++c) {
+    positive(m.a[c], "a");
+    positive(m.b[c], "b");
+  }
+  check.Size(m.f, channels * m.terms * m.PointCount(), "f");
+  check.Size(m.h, channels * m.cluster_count * m.terms * m.WindowSize(), "h");
+  check.Size(m.cluster, m.PointCount(), "cluster");
+  check.Size(m.row_scale, channels * m.PointCount(), "row_scale");
+  check.Size(m.albedo, channels * m.PointCount(), "albedo");
+  constexpr double kAny = -std::numeric_limits<double>::infinity();
+  check.Values(m.f, kAny, "f");
+  check.Values(m.h, kAny, "h");
+  check.Values(m.row_scale, 0, "row_scale");
+  check.Values(m.albedo, 0, "albedo");
+  for (std::size_t n = 0; n < m.cluster.size(); ++n) {
+    check.Require(
+        m.cluster[n] < m.cluster_count,
+        "cluster",
+        fmt::format(
+            "point {} is in cluster {} of {}", n, m.cluster[n], m.cluster_count));
+  }
+}
+
+}  // namespace nacre::factor
