@@ -15,8 +15,9 @@ struct ClusterOptions {
   int iterations = 100;
   int dimensions = 24;
   double log_offset = 0.003;
-  std::uint64_t seed = 1;
-  int thread_count = 0;
+
+  std::uint64_t seed = 1;  ///< of projections and first centres
+  int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -34,8 +35,6 @@ struct ClusterOptions {
         Range{1e-9, 1},
         "added to a slice, relative to its peak, before the logarithm: what lies below "
         "is noise");
-    visit("seed", self.seed, Range{0}, "of projections and first centres");
-    visit("thread_count", self.thread_count, Range{0, 4096}, "0: all cores");
   }
 };
 

@@ -42,7 +42,7 @@ class HeaderWalk {
     for (std::string name = Name(); !name.empty(); name = Name()) {
       const std::string type = Name();
       const auto size = std::bit_cast<std::int32_t>(Word());
-      if (size < 0 || size > bytes_ - file_.tellg()) {
+      if (size < 0 || size > bytes_ - position_) {
         throw BadData(
             fmt::format("{}: attribute '{}' declares {} bytes, in a file of {} bytes",
                         origin_,
@@ -50,15 +50,17 @@ class HeaderWalk {
                         size,
                         bytes_));
       }
-      const std::streamoff value = file_.tellg();
+      std::int32_t rest = size;
       if (name == "chunkCount" && size == 4) {
+        rest = 0;
         const auto chunks = std::bit_cast<std::int32_t>(Word());
         if (chunks < 0 || chunks > bytes_ / kChunkBytes) {
           throw BadData(fmt::format(
               "{}: chunkCount is {}, in a file of {} bytes", origin_, chunks, bytes_));
         }
       }
-      file_.seekg(value + size);
+      file_.ignore(rest);
+      position_ += rest;
       ++count;
     }
     return count > 0;
@@ -69,6 +71,7 @@ class HeaderWalk {
   std::uint32_t Word() {
     std::array<unsigned char, 4> bytes{};
     file_.read(static_cast<char*>(static_cast<void*>(bytes.data())), bytes.size());
+    position_ += 4;
     Require();
     return LoadLittle32(bytes.data());
   }
@@ -77,11 +80,13 @@ class HeaderWalk {
     std::string name;
     for (int c = file_.get(); c != 0; c = file_.get()) {
       Require();
+      ++position_;
       name += static_cast<char>(c);
       if (name.size() > kMaxName) {
         throw BadData(origin_ + ": an attribute's name is longer than 255 bytes");
       }
     }
+    ++position_;
     return name;
   }
 
@@ -95,6 +100,7 @@ class HeaderWalk {
   std::string origin_;
   std::ifstream file_;
   std::int64_t bytes_;
+  std::int64_t position_ = 0;
 };
 
 }  // namespace

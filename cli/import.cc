@@ -1,0 +1,69 @@
+// nacre import: archived scans to a dataset.
+
+#include "cli/command_line.h"
+#include "core/error.h"
+#include "reconstruct/import/images.h"
+#include "reconstruct/import/psf.h"
+
+#include <filesystem>
+#include <memory>
+
+namespace nacre::cli {
+namespace {
+
+using reconstruct::ImageImportOptions;
+using reconstruct::ImportOptions;
+using reconstruct::ImportSummary;
+
+struct Arguments {
+  std::filesystem::path file;
+  std::string from;
+  std::filesystem::path out;
+  ImportOptions options;
+  ImageImportOptions images;
+};
+
+ImportSummary RunImport(const Arguments& args, const Common& common) {
+  const ProgressFunction progress = ConsoleProgress(common);
+  if (args.from == "psf") {
+    return reconstruct::ImportPsf(args.file, args.out, args.options, progress);
+  }
+  if (args.from == "images") {
+    return reconstruct::ImportImages(
+        args.file, args.out, args.options, args.images, progress);
+  }
+  throw UsageError("--from " + args.from +
+                   ": not in this version, which reads psf and images");
+}
+
+int Run(const Arguments& args, const Common& common) {
+  if (!(args.options.pitch_mm > 0)) {
+    throw UsageError("--pitch-mm must be more than 0");
+  }
+  const ImportSummary summary = RunImport(args, common);
+  Say(common, "imported " + args.file.string() + ": " + summary.Brief());
+  Print(common,
+        Json{{"file", args.out.string()},
+             {"points", {summary.points_x, summary.points_y}},
+             {"core", summary.core},
+             {"channels", summary.channel_count},
+             {"clamped", summary.clamped_count},
+             {"invalid", summary.invalid_count}},
+        args.out.string());
+  return 0;
+}
+
+}  // namespace
+
+std::function<int()> MakeImportVerb(CLI::App& app, const Common& common) {
+  const auto args = std::make_shared<Arguments>();
+  app.add_option("file", args->file, "psf: the file; images: the folder")->required();
+  app.add_option("--from", args->from, "psf or images")->required();
+  app.add_option("-o,--out", args->out, "dataset to write, *.rd.exr")->required();
+  AddOptions(app, args->options);
+  app.get_option("--pitch-mm")->required();
+  AddOptions(app, args->images);
+  return [args, &common] { return Run(*args, common); };
+}
+
+}  // namespace nacre::cli

@@ -1,0 +1,444 @@
+// nacre inspect: what a file is, where it came from, and whether it is whole.
+
+#include "cli/artefact.h"
+#include "cli/command_line.h"
+#include "core/error.h"
+#include "core/exr.h"
+#include "core/hash.h"
+#include "core/png.h"
+#include "reconstruct/rd_dataset.h"
+#ifdef NACRE_HAS_ACQUIRE
+#include "acquire/session.h"
+#endif
+#ifdef NACRE_HAS_CALIBRATE
+#include "calibrate/calibration.h"
+#endif
+#ifdef NACRE_HAS_FACTOR
+#include "factor/material.h"
+#endif
+#ifdef NACRE_HAS_RIGS
+#include "rigs/phantom.h"
+#endif
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <memory>
+#include <sstream>
+
+namespace nacre::cli {
+namespace {
+
+struct Arguments {
+  std::filesystem::path file;
+  bool provenance = false;
+};
+
+/// Smallest and largest of the values that are numbers, and how many aren't.
+struct ValueRange {
+  double min = std::numeric_limits<double>::infinity();
+  double max = -std::numeric_limits<double>::infinity();
+  double sum = 0;
+  std::int64_t count = 0;
+  std::int64_t bad_count = 0;
+
+  void Add(double value) {
+    if (!std::isfinite(value)) {
+      ++bad_count;
+      return;
+    }
+    min = std::min(min, value);
+    max = std::max(max, value);
+    sum += value;
+    ++count;
+  }
+  Json ToJson() const {
+    Json json = count > 0 ? Json{{"min", min},
+                                 {"max", max},
+                                 {"mean", sum / static_cast<double>(count)}}
+                          : Json::object();
+    if (bad_count > 0) {
+      json["not_finite"] = bad_count;
+    }
+    return json;
+  }
+};
+
+// Text of a provenance attribute as JSON; what isn't JSON is shown as it is.
+Json ProvenanceOf(const std::string& text) {
+  if (text.empty() || !Json::accept(text)) {
+    return text;
+  }
+  return Json::parse(text);
+}
+
+// What a pass over all slices, which verifies their checksums, finds.
+Json DatasetContents(reconstruct::RdReader& reader, const ProgressFunction& progress) {
+  const reconstruct::RdHeader& header = reader.header();
+  const auto window = static_cast<std::size_t>(header.WindowSize());
+  std::vector<ValueRange> values(header.channels.size());
+  std::vector<ValueRange> albedos(header.channels.size());
+  std::int64_t invalid = 0;
+  std::int64_t negative = 0;
+  for (int j = 0; j < header.points_y; ++j) {
+    Report(progress, {"inspect", j, header.points_y, ""});
+    for (int i = 0; i < header.points_x; ++i) {
+      const reconstruct::RdSlice slice = reader.ReadSlice(i, j);
+      for (std::size_t c = 0; c < values.size(); ++c) {
+        double total = 0;
+        for (std::size_t k = c * window; k < (c + 1) * window; ++k) {
+          if (slice.valid[k] == 0) {
+            ++invalid;
+            continue;
+          }
+          const auto value = static_cast<double>(slice.rd[k]);
+          values[c].Add(value);
+          negative += value < 0 ? 1 : 0;
+          total += value;
+        }
+        albedos[c].Add(total * header.CellAreaMm2());
+      }
+    }
+  }
+  Json channels = Json::array();
+  for (std::size_t c = 0; c < values.size(); ++c) {
+    channels.push_back({{"name", header.channels[c]},
+                        {"rd_per_mm2", values[c].ToJson()},
+                        {"albedo", albedos[c].ToJson()}});
+  }
+  return {{"channels", channels},
+          {"invalid_values", invalid},
+          {"negative_values", negative},
+          {"checksums", fmt::format("{} slices verified", header.PointCount())}};
+}
+
+Json InspectDataset(const std::filesystem::path& path, const Common& common) {
+  reconstruct::RdReader reader(path);
+  const reconstruct::RdHeader& header = reader.header();
+  const std::int64_t values = header.PointCount() * header.SliceSize();
+  Json json{{"points", {header.points_x, header.points_y}},
+            {"core", header.core},
+            {"pitch_mm", header.pitch_mm},
+            {"window_mm", header.core * header.pitch_mm},
+            {"eta", header.eta},
+            {"units", "mm^-2"},
+            {"memory_bytes", 9 * values}};
+  json.update(DatasetContents(reader, ConsoleProgress(common)));
+  json["provenance"] = ProvenanceOf(header.provenance);
+  return json;
+}
+
+Json InspectMaterial(const std::filesystem::path& path) {
+#ifdef NACRE_HAS_FACTOR
+  const factor::Material material = factor::ReadMaterial(path);
+  return {{"method", material.method},
+          {"terms", material.terms},
+          {"clusters", material.cluster_count},
+          {"points", {material.points_x, material.points_y}},
+          {"core", material.core},
+          {"pitch_mm", material.pitch_mm},
+          {"window_mm", material.core * material.pitch_mm},
+          {"eta", material.eta},
+          {"channels", material.channels},
+          {"storage_bytes", material.StorageBytes()},
+          {"error", material.error},
+          {"checksums", "verified"},
+          {"provenance", ProvenanceOf(material.provenance)}};
+#else
+  throw UsageError(path.string() +
+                   ": is a material, and this build was made without `factor`");
+#endif
+}
+
+Json InspectExr(const std::filesystem::path& path) {
+  Json parts = Json::array();
+  Json provenance;
+  for (const ExrPart& part : ReadExr(path)) {
+    Json channels = Json::array();
+    for (std::size_t c = 0; c < part.channels.size(); ++c) {
+      ValueRange range;
+      for (std::size_t p = 0; p < part.PixelCount(); ++p) {
+        range.Add(static_cast<double>(part.Channel(c)[p]));
+      }
+      Json channel{{"name", part.channels[c]}};
+      channel.update(range.ToJson());
+      channels.push_back(channel);
+    }
+    parts.push_back({{"name", part.name},
+                     {"size", {part.width, part.height}},
+                     {"channels", channels},
+                     {"attributes", part.attributes}});
+    const auto found = part.attributes.find("nacre.provenance");
+    if (found != part.attributes.end()) {
+      provenance = ProvenanceOf(found->second);
+    }
+  }
+  return {{"parts", parts}, {"provenance", provenance}};
+}
+
+Json InspectPng(const std::filesystem::path& path) {
+  const PngImage image = ReadPng(path);
+  ValueRange range;
+  for (const std::uint16_t value : image.values) {
+    range.Add(value);
+  }
+  return {{"size", {image.width, image.height}},
+          {"channels", image.channel_count},
+          {"bits", image.bit_depth},
+          {"values", range.ToJson()}};
+}
+
+Json InspectSession(const std::filesystem::path& path, const Common& common) {
+#ifdef NACRE_HAS_ACQUIRE
+  const acquire::SessionReader session(path);
+  const acquire::RigDescription& rig = session.rig();
+  const ProgressFunction progress = ConsoleProgress(common);
+  for (std::int64_t n = 0; n < session.picture_count(); ++n) {
+    Report(progress, {"inspect", n, session.picture_count(), "checksums"});
+    session.ReadFrame(n);  // throws if the picture isn't the one of the journal
+  }
+  const bool complete = session.IsComplete();
+  const acquire::CameraInfo& camera = session.manifest().camera;
+  return {{"sample", rig.sample.name},
+          {"rig", session.manifest().rig_file},
+          {"rig_hash", session.manifest().rig_hash},
+          {"camera",
+           {{"model", camera.model},
+            {"size", {camera.width, camera.height}},
+            {"bits", camera.bit_depth}}},
+          {"illuminator", session.manifest().illuminator.model},
+          {"channels", rig.scanner.channels},
+          {"points", {rig.grid.points_x, rig.grid.points_y}},
+          {"core", rig.grid.core},
+          {"pitch_mm", rig.grid.pitch_mm},
+          {"pictures", session.picture_count()},
+          {"pictures_planned", session.schedule().size()},
+          {"complete", complete},
+          {"resumable", !complete},
+          {"scan_map", session.manifest().scan_map.has_value()},
+          {"checksums", fmt::format("{} pictures verified", session.picture_count())},
+          {"provenance", {{"version", session.manifest().software_version}}}};
+#else
+  (void)common;
+  throw UsageError(path.string() +
+                   ": is a session, and this build was made without `acquire`");
+#endif
+}
+
+Json InspectCalibration(const std::filesystem::path& path) {
+#ifdef NACRE_HAS_CALIBRATE
+  const calibrate::Calibration c = calibrate::ReadCalibration(path);
+  Json channels = Json::array();
+  for (const calibrate::ChannelResponse& channel : c.channels) {
+    channels.push_back(
+        {{"name", channel.name},
+         {"flux_scale_counts_mm2_sr_per_us", channel.flux_scale_counts_mm2_sr_per_us},
+         {"flux_scale_spread", channel.flux_scale_spread}});
+  }
+  const calibrate::PixelPoint centre{0.5 * (c.camera.width_px - 1),
+                                     0.5 * (c.camera.height_px - 1)};
+  return {{"camera", {{"size", {c.camera.width_px, c.camera.height_px}}}},
+          {"pixel_mm", std::sqrt(c.camera.FootprintMm2(centre))},
+          {"reprojection_rms_px", c.reprojection_rms_px},
+          {"laser_map_rms_mm", c.laser_map_rms_mm},
+          {"laser_map_max_mm", c.laser_map_max_mm},
+          {"dark_offset_counts", c.dark.offset_counts},
+          {"dark_rate_counts_per_us", c.dark.rate_counts_per_us},
+          {"gain_electrons_per_count", c.gain_electrons_per_count},
+          {"read_noise_electrons", c.read_noise_electrons},
+          {"saturation_counts", c.saturation_counts},
+          {"channels", channels},
+          {"session_rig_hash", c.session_rig_hash},
+          {"provenance", ProvenanceOf(c.provenance)}};
+#else
+  throw UsageError(path.string() +
+                   ": is a calibration, and this build was made without `calibrate`");
+#endif
+}
+
+Json InspectPhantom(const std::filesystem::path& path) {
+#ifdef NACRE_HAS_RIGS
+  const rigs::Phantom phantom = rigs::ReadPhantom(path);
+  Json media = Json::array();
+  for (const rigs::Medium& medium : phantom.media) {
+    media.push_back({{"name", medium.name},
+                     {"sigma_a_per_mm", medium.sigma_a_per_mm},
+                     {"sigma_s_per_mm", medium.sigma_s_per_mm},
+                     {"g", medium.g}});
+  }
+  return {{"channels", phantom.channels},
+          {"thickness_mm",
+           std::isfinite(phantom.slab.thickness_mm) ? Json(phantom.slab.thickness_mm)
+                                                    : Json("inf")},
+          {"eta", phantom.slab.eta},
+          {"bottom", rigs::Name(phantom.slab.bottom)},
+          {"media", media},
+          {"points", {phantom.grid.points_x, phantom.grid.points_y}},
+          {"core", phantom.grid.core},
+          {"pitch_mm", phantom.grid.pitch_mm}};
+#else
+  throw UsageError(path.string() +
+                   ": is a phantom, and this build was made without `rigs`");
+#endif
+}
+
+Json InspectRig(const std::filesystem::path& path) {
+#ifdef NACRE_HAS_ACQUIRE
+  const acquire::RigDescription rig = acquire::ReadRig(path);
+  return {{"rig_kind", rig.kind},
+          {"sample", rig.sample.name},
+          {"channels", rig.scanner.channels},
+          {"points", {rig.grid.points_x, rig.grid.points_y}},
+          {"core", rig.grid.core},
+          {"pitch_mm", rig.grid.pitch_mm},
+          {"pictures_planned", acquire::Schedule(rig).size()},
+          {"hash", rig.hash}};
+#else
+  throw UsageError(path.string() +
+                   ": is a rig, and this build was made without `acquire`");
+#endif
+}
+
+// Counts alone, from the header: a mesh is read by the renderer, not here.
+Json InspectPly(const std::filesystem::path& path) {
+  constexpr std::size_t kHeaderBytes = 1 << 16;
+  std::istringstream header(Head(path, kHeaderBytes));
+  Json json = Json::object();
+  std::string line;
+  while (std::getline(header, line) && !line.starts_with("end_header")) {
+    std::istringstream words(line);
+    std::string word;
+    std::string name;
+    std::string value;
+    words >> word >> name >> value;
+    if (word == "format") {
+      json["format"] = name + " " + value;
+    } else if (word == "element") {
+      json[name] = value;
+    } else if (word == "property") {
+      json["properties"].push_back(line.substr(sizeof("property")));
+    }
+  }
+  if (!header) {
+    throw BadData(path.string() + ": a PLY file whose header doesn't end");
+  }
+  return json;
+}
+
+Json InspectObj(const std::filesystem::path& path) {
+  std::ifstream file(path);
+  std::string line;
+  std::array<std::int64_t, 4> counts{};
+  std::array<ValueRange, 3> box;
+  while (std::getline(file, line)) {
+    std::istringstream words(line);
+    std::string word;
+    words >> word;
+    const std::array<const char*, 4> names = {"v", "vt", "vn", "f"};
+    const auto found = std::find(names.begin(), names.end(), word);
+    if (found == names.end()) {
+      continue;
+    }
+    ++counts[static_cast<std::size_t>(found - names.begin())];
+    for (std::size_t k = 0; word == "v" && k < 3; ++k) {
+      double value = std::numeric_limits<double>::quiet_NaN();
+      words >> value;
+      box[k].Add(value);
+    }
+  }
+  return {{"vertices", counts[0]},
+          {"texture_coordinates", counts[1]},
+          {"normals", counts[2]},
+          {"faces", counts[3]},
+          {"x", box[0].ToJson()},
+          {"y", box[1].ToJson()},
+          {"z", box[2].ToJson()}};
+}
+
+Json Inspect(const std::filesystem::path& path,
+             ArtefactKind kind,
+             const Common& common) {
+  switch (kind) {
+    case ArtefactKind::kDataset:
+      return InspectDataset(path, common);
+    case ArtefactKind::kMaterial:
+      return InspectMaterial(path);
+    case ArtefactKind::kExrPicture:
+      return InspectExr(path);
+    case ArtefactKind::kPngPicture:
+      return InspectPng(path);
+    case ArtefactKind::kSession:
+      return InspectSession(path, common);
+    case ArtefactKind::kCalibration:
+      return InspectCalibration(path);
+    case ArtefactKind::kPhantom:
+      return InspectPhantom(path);
+    case ArtefactKind::kRig:
+      return InspectRig(path);
+    case ArtefactKind::kPlyMesh:
+      return InspectPly(path);
+    case ArtefactKind::kObjMesh:
+      return InspectObj(path);
+    case ArtefactKind::kUnknown:
+      break;
+  }
+  throw BadData(path.string() +
+                ": is none of: dataset, material, session, calibration, phantom, rig, "
+                "picture (.exr, .png), mesh (.ply, .obj)");
+}
+
+// One line a key; lists of objects one line an element.
+std::string ToText(const Json& json) {
+  std::string text;
+  for (const auto& [key, value] : json.items()) {
+    const bool table = value.is_array() && !value.empty() && value[0].is_object();
+    if (!table) {
+      text += fmt::format("{:<20}{}\n",
+                          key,
+                          value.is_string() ? value.get<std::string>() : value.dump());
+      continue;
+    }
+    for (const Json& element : value) {
+      text += fmt::format("{:<20}{}\n", key, element.dump());
+    }
+  }
+  if (!text.empty()) {
+    text.pop_back();
+  }
+  return text;
+}
+
+int Run(const Arguments& args, const Common& common) {
+  const ArtefactKind kind = DetectKind(args.file);
+  Json json{{"file", args.file.string()}, {"kind", Name(kind)}};
+  if (std::filesystem::is_regular_file(args.file)) {
+    json["bytes"] = std::filesystem::file_size(args.file);
+    json["xxh3"] = HashFile(args.file);
+  }
+  json.update(Inspect(args.file, kind, common));
+  if (args.provenance) {
+    const Json provenance = json.value("provenance", Json());
+    Print(common, provenance, provenance.dump(2));
+    return 0;
+  }
+  Print(common, json, ToText(json));
+  return 0;
+}
+
+}  // namespace
+
+std::function<int()> MakeInspectVerb(CLI::App& app, const Common& common) {
+  const auto args = std::make_shared<Arguments>();
+  app.add_option("file", args->file, "anything nacre reads or writes")->required();
+  app.add_flag("--provenance",
+               args->provenance,
+               "only where it came from: software, options and hashes of the inputs");
+  app.footer(
+      "Reads all of the file and verifies its checksums: exit code 3 if it isn't "
+      "whole.");
+  return [args, &common] { return Run(*args, common); };
+}
+
+}  // namespace nacre::cli
