@@ -1,0 +1,44 @@
+#pragma once
+
+#include "acquire/illuminator.h"
+#include "rigs/world.h"
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace nacre::rigs {
+
+/// Two mirrors over the sample. The first deflects along x, the second, `separation_mm`
+/// further on, along y and down onto the plane, `distance_mm` below it:
+///   x = e tan α_x + D tan α_x / cos α_y,  y = D tan α_y,
+/// which draws a square of angles as a pincushion [Marshall04]; then the whole scanner
+/// is turned and shifted a little, as no rig is mounted perfectly.
+struct LaserModel {
+  double distance_mm = 400;
+  double separation_mm = 6;
+  double rotation_rad = 0;
+  PointMm offset_mm;
+  double max_angle_rad = 0.3;
+  double spot_sigma_mm = 0.12;   ///< of the Gaussian spot on the sample plane
+  std::vector<double> power_mw;  ///< a channel; flux of one spot
+  std::vector<std::string> channels;
+
+  Spot SpotAt(acquire::ScanAngle angle) const;
+};
+
+class LaserTwin final : public acquire::Illuminator {
+ public:
+  LaserTwin(LaserModel model, std::shared_ptr<World> world);
+  ~LaserTwin() override;
+
+  acquire::IlluminatorInfo Info() const override;
+  void Light(std::span<const acquire::ScanAngle> spots, int channel) override;
+  void Blank() noexcept override;
+
+ private:
+  LaserModel model_;
+  std::shared_ptr<World> world_;
+};
+
+}  // namespace nacre::rigs

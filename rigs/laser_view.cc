@@ -1,0 +1,215 @@
+#include "rigs/laser_view.h"
+
+#include "core/error.h"
+#include "core/fresnel.h"
+#include "core/parallel.h"
+#include "rigs/internal/gauss_legendre.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace nacre::rigs {
+namespace {
+
+constexpr std::int64_t kRowsPerTask = 8;
+
+// The peak of R_d may be narrower than a pixel: within some pixels of a spot the mean
+// over the footprint is taken with a Gauss rule of that many points a side.
+struct NearRule {
+  double radius_px;
+  int order;
+};
+constexpr std::array kNearRules = {NearRule{2.5, 8}, NearRule{14, 2}};
+
+std::vector<float> RadianceFactors(const PinholeCamera& camera,
+                                   const PlaneMap& map,
+                                   double eta) {
+  const Vector3 eye = camera.Position();
+  const double per_exitance = 1 / (std::numbers::pi * ExitNormalization(eta));
+  std::vector<float> factors(map.x.size());
+  for (std::size_t k = 0; k < factors.size(); ++k) {
+    const double dx = eye[0] - static_cast<double>(map.x[k]);
+    const double dy = eye[1] - static_cast<double>(map.y[k]);
+    const double cosine = eye[2] / std::sqrt(dx * dx + dy * dy + eye[2] * eye[2]);
+    factors[k] = static_cast<float>(FresnelTransmittance(cosine, eta) * per_exitance);
+  }
+  return factors;
+}
+
+}  // namespace
+
+LaserView::LaserView(const PinholeCamera& camera,
+                     std::shared_ptr<const Transport> sample,
+                     double spot_sigma_mm,
+                     int thread_count)
+    : map_(MapSample(camera, thread_count)),
+      sample_(std::move(sample)),
+      spot_sigma_mm_(spot_sigma_mm),
+      pixel_mm_(map_.PixelSize()),
+      thread_count_(thread_count) {
+  Expect(spot_sigma_mm > 0, "a spot of some size");
+  radiance_factor_ = RadianceFactors(camera, map_, sample_->phantom().slab.eta);
+  for (int row = 0; row < map_.height; ++row) {
+    const auto begin = map_.y.begin() + static_cast<std::ptrdiff_t>(map_.Index(0, row));
+    const auto [low, high] = std::minmax_element(begin, begin + map_.width);
+    row_lowest_y_.push_back(*low);
+    row_highest_y_.push_back(*high);
+  }
+}
+
+// The columns of a row that may lie within the radius; x grows along a row.
+LaserView::Columns LaserView::Within(int row, PointMm centre, double radius_mm) const {
+  const auto r = static_cast<std::size_t>(row);
+  const double dy = std::max({0.0,
+                              static_cast<double>(row_lowest_y_[r]) - centre.y,
+                              centre.y - static_cast<double>(row_highest_y_[r])});
+  if (dy >= radius_mm) {
+    return {};
+  }
+  const auto half = std::sqrt(radius_mm * radius_mm - dy * dy);
+  const float* const begin = &map_.x[map_.Index(0, row)];
+  const float* const end = begin + map_.width;
+  return {
+      static_cast<int>(
+          std::lower_bound(begin, end, static_cast<float>(centre.x - half)) - begin),
+      static_cast<int>(
+          std::upper_bound(begin, end, static_cast<float>(centre.x + half)) - begin)};
+}
+
+void LaserView::AddSampleSpot(PointMm centre,
+                              double entering_mw,
+                              std::size_t channel,
+                              int row,
+                              float* exitance) const {
+  const Columns all = Within(row, centre, sample_->ReachMm(channel));
+  if (all.begin >= all.end) {
+    return;
+  }
+  const double near_mm = kNearRules.back().radius_px * pixel_mm_;
+  Columns near = Within(row, centre, near_mm);
+  near.begin = std::clamp(near.begin, all.begin, all.end);
+  near.end = std::clamp(near.end, near.begin, all.end);
+  const auto add_plain = [&](int begin, int end) {
+    const std::size_t at = map_.Index(begin, row);
+    if (end > begin) {
+      sample_->AddExitance(
+          centre,
+          channel,
+          entering_mw,
+          {&map_.x[at], &map_.y[at], static_cast<std::size_t>(end - begin)},
+          exitance + begin);
+    }
+  };
+  add_plain(all.begin, near.begin);
+  add_plain(near.end, all.end);
+
+  constexpr std::size_t kMostNodes = 64;
+  std::array<float, kMostNodes> x{};
+  std::array<float, kMostNodes> y{};
+  for (int column = near.begin; column < near.end; ++column) {
+    const std::size_t at = map_.Index(column, row);
+    const double r_px = std::hypot(static_cast<double>(map_.x[at]) - centre.x,
+                                   static_cast<double>(map_.y[at]) - centre.y) /
+                        pixel_mm_;
+    const int order =
+        r_px < kNearRules[0].radius_px ? kNearRules[0].order : kNearRules[1].order;
+    static const internal::GaussRule kFine =
+        internal::GaussLegendre(kNearRules[0].order);
+    static const internal::GaussRule kCoarse =
+        internal::GaussLegendre(kNearRules[1].order);
+    const internal::GaussRule& rule = order == kNearRules[0].order ? kFine : kCoarse;
+    const auto side = static_cast<std::size_t>(order);
+    for (std::size_t b = 0; b < side; ++b) {
+      for (std::size_t a = 0; a < side; ++a) {
+        const PointMm point =
+            map_.At(column, row, 0.5 * rule.node[a], 0.5 * rule.node[b]);
+        x[b * side + a] = static_cast<float>(point.x);
+        y[b * side + a] = static_cast<float>(point.y);
+      }
+    }
+    std::array<float, kMostNodes> value{};
+    sample_->AddExitance(
+        centre, channel, entering_mw, {x.data(), y.data(), side * side}, value.data());
+    double mean = 0;
+    for (std::size_t k = 0; k < side * side; ++k) {
+      mean += 0.25 * rule.weight[k % side] * rule.weight[k / side] *
+              static_cast<double>(value[k]);
+    }
+    exitance[column] += static_cast<float>(mean);
+  }
+}
+
+std::vector<float> LaserView::OnSample(std::span<const Spot> spots,
+                                       double flux_mw,
+                                       std::size_t channel) const {
+  const double eta = sample_->phantom().slab.eta;
+  std::vector<float> radiance(map_.x.size(), 0.0F);
+  ParallelForBlocks(
+      map_.height, kRowsPerTask, thread_count_, [&](auto begin, auto end) {
+        for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+          const std::size_t at = map_.Index(0, row);
+          for (const Spot& spot : spots) {
+            const double entering_mw =
+                flux_mw * FresnelTransmittance(spot.cos_incidence, eta);
+            AddSampleSpot(spot.centre_mm, entering_mw, channel, row, &radiance[at]);
+          }
+          for (int column = 0; column < map_.width; ++column) {
+            const std::size_t k = map_.Index(column, row);
+            radiance[k] *= radiance_factor_[k];
+          }
+        }
+      });
+  return radiance;
+}
+
+// Adds the Gaussian spot's density of flux, mm⁻². Equidistant samples integrate a
+// Gaussian to rounding as soon as they resolve it.
+void LaserView::AddReferenceSpot(PointMm centre,
+                                 int row,
+                                 float* density_per_mm2) const {
+  constexpr double kFarthestSigma = 6;
+  const int side =
+      std::clamp(static_cast<int>(std::ceil(2 * pixel_mm_ / spot_sigma_mm_)), 2, 64);
+  const double peak =
+      1 / (2 * std::numbers::pi * spot_sigma_mm_ * spot_sigma_mm_ * side * side);
+  const Columns columns =
+      Within(row, centre, kFarthestSigma * spot_sigma_mm_ + 2 * pixel_mm_);
+  for (int column = columns.begin; column < columns.end; ++column) {
+    double sum = 0;
+    for (int k = 0; k < side * side; ++k) {
+      const PointMm point = map_.At(column,
+                                    row,
+                                    (k % side + 0.5) / side - 0.5,
+                                    (static_cast<double>(k / side) + 0.5) / side - 0.5);
+      const double dx = (point.x - centre.x) / spot_sigma_mm_;
+      const double dy = (point.y - centre.y) / spot_sigma_mm_;
+      sum += std::exp(-0.5 * (dx * dx + dy * dy));
+    }
+    density_per_mm2[column] += static_cast<float>(sum * peak);
+  }
+}
+
+std::vector<float> LaserView::OnReference(std::span<const Spot> spots,
+                                          double flux_mw,
+                                          double reflectance) const {
+  std::vector<float> radiance(map_.x.size(), 0.0F);
+  const auto factor = static_cast<float>(flux_mw * reflectance / std::numbers::pi);
+  ParallelForBlocks(
+      map_.height, kRowsPerTask, thread_count_, [&](auto begin, auto end) {
+        for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+          const std::size_t at = map_.Index(0, row);
+          for (const Spot& spot : spots) {
+            AddReferenceSpot(spot.centre_mm, row, &radiance[at]);
+          }
+          for (int column = 0; column < map_.width; ++column) {
+            radiance[map_.Index(column, row)] *= factor;
+          }
+        }
+      });
+  return radiance;
+}
+
+}  // namespace nacre::rigs
