@@ -1,0 +1,185 @@
+#include "calibrate/geometry.h"
+
+#include "core/error.h"
+
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numeric>
+#include <vector>
+
+namespace nacre::calibrate {
+namespace {
+
+using Corners = std::vector<cv::Point2f>;
+
+cv::Mat FloatPicture(const acquire::Frame& frame) {
+  // The matrix only looks at the counts here; convertTo copies.
+  const cv::Mat counts(frame.height,
+                       frame.width,
+                       CV_16UC1,
+                       const_cast<std::uint16_t*>(frame.counts.data()));
+  cv::Mat picture;
+  counts.convertTo(picture, CV_32F);
+  return picture;
+}
+
+// Eight bits from nearly the darkest to nearly the brightest, for the detector.
+cv::Mat BytePicture(const acquire::Frame& frame) {
+  std::vector<std::uint16_t> sorted = frame.counts;
+  const auto rank = static_cast<std::ptrdiff_t>(sorted.size() / 200);
+  std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
+  const double low = sorted[static_cast<std::size_t>(rank)];
+  std::nth_element(sorted.begin(), sorted.end() - 1 - rank, sorted.end());
+  const double high = *(sorted.end() - 1 - rank);
+  const double scale = 255 / std::max(high - low, 1.0);
+  cv::Mat picture;
+  FloatPicture(frame).convertTo(picture, CV_8U, scale, -low * scale);
+  return picture;
+}
+
+// Row by row from the sample's top, left to right, whatever corner the detector began
+// with.
+Corners Ordered(Corners corners, cv::Size board, const std::string& where) {
+  const auto at = [&](int column, int row) -> cv::Point2f {
+    return corners[static_cast<std::size_t>(row * board.width + column)];
+  };
+  const cv::Point2f right = at(board.width - 1, 0) - at(0, 0) +
+                            at(board.width - 1, board.height - 1) -
+                            at(0, board.height - 1);
+  if (std::abs(right.x) <= std::abs(right.y)) {
+    throw BadData(where +
+                  ": the board's longer rows run across the picture; turn the camera "
+                  "upright, sample +x to the right");
+  }
+  if (right.x < 0) {
+    std::reverse(corners.begin(), corners.end());  // half a turn
+  }
+  const cv::Point2f down = at(0, board.height - 1) - at(0, 0);
+  if (down.y < 0) {
+    throw BadData(where + ": the picture is a mirror image; flip it in the camera");
+  }
+  return corners;
+}
+
+Corners FindCorners(const acquire::SessionReader& session, std::int64_t number) {
+  const acquire::TargetsDescription& targets = session.rig().targets;
+  const cv::Size board(targets.checkerboard_columns, targets.checkerboard_rows);
+  const std::string where = (session.folder() / session.Entry(number).file).string();
+  const acquire::Frame frame = session.ReadFrame(number);
+  Corners corners;
+  const bool found = cv::findChessboardCornersSB(
+      BytePicture(frame), board, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
+  if (!found) {
+    throw BadData(fmt::format(
+        "{}: no checkerboard of {} x {} inner corners can be made out in pose {}; see "
+        "that all of it is in view, in focus, and neither dark nor overexposed",
+        where,
+        board.width,
+        board.height,
+        session.schedule()[number].pose));
+  }
+  // A window of less than half a square sees one corner only.
+  float closest = std::numeric_limits<float>::max();
+  for (std::size_t k = 1; k < corners.size(); ++k) {
+    closest =
+        std::min(closest, static_cast<float>(cv::norm(corners[k] - corners[k - 1])));
+  }
+  const int half_window = std::clamp(static_cast<int>(0.4F * closest), 2, 11);
+  constexpr int kMaxIterations = 100;
+  constexpr double kTolerancePx = 1e-4;
+  cv::cornerSubPix(FloatPicture(frame),
+                   corners,
+                   cv::Size(half_window, half_window),
+                   cv::Size(-1, -1),
+                   cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
+                                    kMaxIterations,
+                                    kTolerancePx));
+  return Ordered(std::move(corners), board, where);
+}
+
+std::vector<cv::Point3f> BoardPoints(const acquire::TargetsDescription& targets) {
+  std::vector<cv::Point3f> points_mm;
+  for (int row = 0; row < targets.checkerboard_rows; ++row) {
+    for (int column = 0; column < targets.checkerboard_columns; ++column) {
+      points_mm.emplace_back(
+          static_cast<float>((column - 0.5 * (targets.checkerboard_columns - 1)) *
+                             targets.checkerboard_square_mm),
+          static_cast<float>((0.5 * (targets.checkerboard_rows - 1) - row) *
+                             targets.checkerboard_square_mm),
+          0.0F);
+    }
+  }
+  return points_mm;
+}
+
+CameraGeometry ToGeometry(const acquire::CameraInfo& info,
+                          const cv::Matx33d& matrix,
+                          const cv::Mat& distortion,
+                          const std::pair<cv::Vec3d, cv::Vec3d>& pose) {
+  cv::Matx33d rotation;
+  cv::Rodrigues(pose.first, rotation);
+  CameraGeometry camera;
+  camera.width_px = info.width;
+  camera.height_px = info.height;
+  camera.fx_px = matrix(0, 0);
+  camera.fy_px = matrix(1, 1);
+  camera.cx_px = matrix(0, 2);
+  camera.cy_px = matrix(1, 2);
+  camera.k1 = distortion.at<double>(0);
+  camera.k2 = distortion.at<double>(1);
+  camera.p1 = distortion.at<double>(2);
+  camera.p2 = distortion.at<double>(3);
+  camera.k3 = distortion.at<double>(4);
+  std::copy_n(rotation.val, 9, camera.camera_from_sample_rotation.begin());
+  std::copy_n(pose.second.val, 3, camera.camera_from_sample_translation_mm.begin());
+  return camera;
+}
+
+}  // namespace
+
+GeometryResult EstimateGeometry(const acquire::SessionReader& session,
+                                const ProgressFunction& progress) {
+  const acquire::RigDescription& rig = session.rig();
+  std::vector<Corners> corners_px;
+  for (std::int64_t number = 0; number < session.schedule().grid_begin(); ++number) {
+    if (session.schedule()[number].target == acquire::Target::kCheckerboard) {
+      corners_px.push_back(FindCorners(session, number));
+      Report(progress,
+             {.stage = "geometry",
+              .done = std::ssize(corners_px),
+              .total = rig.targets.checkerboard_poses,
+              .note = "checkerboard"});
+    }
+  }
+  const std::vector<std::vector<cv::Point3f>> points_mm(corners_px.size(),
+                                                        BoardPoints(rig.targets));
+  const acquire::CameraInfo& info = session.manifest().camera;
+  cv::Matx33d matrix = cv::Matx33d::eye();
+  cv::Mat distortion;
+  std::vector<cv::Vec3d> rotations;
+  std::vector<cv::Vec3d> translations_mm;
+  constexpr int kMaxIterations = 200;
+  // k3 is left at 0: a few boards of moderate angle can't tell it from k2.
+  const double rms_px = cv::calibrateCamera(
+      points_mm,
+      corners_px,
+      cv::Size(info.width, info.height),
+      matrix,
+      distortion,
+      rotations,
+      translations_mm,
+      cv::CALIB_FIX_K3,
+      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
+                       kMaxIterations,
+                       std::numeric_limits<double>::epsilon()));
+  return {.camera =
+              ToGeometry(info, matrix, distortion, {rotations[0], translations_mm[0]}),
+          .reprojection_rms_px = rms_px};
+}
+
+}  // namespace nacre::calibrate
