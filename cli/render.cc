@@ -1,0 +1,130 @@
+// nacre render: a scene with its materials to a picture.
+
+#include "render/render.h"
+
+#include "cli/command_line.h"
+#include "core/error.h"
+#include "core/png.h"
+#include "core/provenance.h"
+#include "render/tone.h"
+
+#include <filesystem>
+#include <memory>
+
+namespace nacre::cli {
+namespace {
+
+struct Arguments {
+  std::filesystem::path scene;
+  std::filesystem::path out;
+  std::filesystem::path png;
+  std::vector<std::string> defines;
+  bool lenient = false;
+  bool stats = false;
+  double exposure_ev = 0;
+  render::RenderOptions options;
+};
+
+void AddArguments(CLI::App& app, Arguments& arguments) {
+  app.add_option("scene", arguments.scene, "scene in Mitsuba's XML (0.4 to 0.6)")
+      ->required();
+  app.add_option("--out", arguments.out, "picture: .exr (linear) or .png (sRGB)")
+      ->required();
+  app.add_option("--png", arguments.png, "write this PNG too");
+  app.add_option("--exposure", arguments.exposure_ev, "of the PNG, in stops")
+      ->capture_default_str()
+      ->check(CLI::Range(-64.0, 64.0));
+  app.add_option("-D", arguments.defines, "name=value for a $name in the scene")
+      ->allow_extra_args(false);
+  app.add_flag("--lenient",
+               arguments.lenient,
+               "unknown words in the scene are left out with a warning");
+  app.add_flag("--stats", arguments.stats, "print where time went and what was done");
+  AddOptions(app, arguments.options);
+}
+
+std::map<std::string, std::string> ParseDefines(const std::vector<std::string>& words) {
+  std::map<std::string, std::string> defines;
+  for (const std::string& word : words) {
+    const std::size_t equals = word.find('=');
+    if (equals == 0 || equals == std::string::npos) {
+      throw UsageError("-D " + word + ": it must be name=value");
+    }
+    defines[word.substr(0, equals)] = word.substr(equals + 1);
+  }
+  return defines;
+}
+
+std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments) {
+  Provenance provenance;
+  provenance.command = "render";
+  provenance.options = OptionsToJson(arguments.options);
+  // Neither changes the picture.
+  provenance.options.erase("snapshot");
+  provenance.options.erase("thread_count");
+  provenance.options["seed"] = arguments.options.seed;
+  provenance.options["define"] = arguments.defines;
+  for (const std::filesystem::path& file : scene.files) {
+    provenance.AddInput(file);
+  }
+  return provenance.ToString();
+}
+
+bool IsPng(const std::filesystem::path& path) {
+  return path.extension() == ".png";
+}
+
+void WriteImage(const std::filesystem::path& path,
+                ExrPart image,
+                const Arguments& arguments,
+                const std::string& provenance) {
+  if (IsPng(path)) {
+    WritePng(path, render::ToPng(image, arguments.exposure_ev));
+    return;
+  }
+  image.attributes["nacre.kind"] = "image";
+  image.attributes["nacre.provenance"] = provenance;
+  WriteExr(path, {std::move(image)});
+}
+
+int Run(Arguments& arguments, const Common& common) {
+  if (!IsPng(arguments.out) && arguments.out.extension() != ".exr") {
+    throw UsageError("--out " + arguments.out.string() +
+                     ": the name must end in .exr or .png");
+  }
+  render::RenderOptions& options = arguments.options;
+  options.seed = common.seed;
+  options.thread_count = common.thread_count;
+  const render::Scene scene = render::ReadScene(
+      arguments.scene,
+      {.defines = ParseDefines(arguments.defines), .lenient = arguments.lenient});
+  for (const std::string& note : scene.notes) {
+    Say(common, note);
+  }
+  const std::string provenance = ProvenanceOf(scene, arguments);
+  const auto save = [&](const ExrPart& image) {
+    WriteImage(arguments.out, image, arguments, provenance);
+    if (!arguments.png.empty()) {
+      WriteImage(arguments.png, image, arguments, provenance);
+    }
+  };
+  const render::Rendering rendering =
+      render::Render(scene, options, ConsoleProgress(common), save);
+  save(rendering.image);
+  Json json = rendering.summary.ToJson();
+  json["out"] = arguments.out.string();
+  Print(common,
+        json,
+        arguments.stats ? rendering.summary.Table() : rendering.summary.Brief());
+  return 0;
+}
+
+}  // namespace
+
+std::function<int()> MakeRenderVerb(CLI::App& app, const Common& common) {
+  auto arguments = std::make_shared<Arguments>();
+  AddArguments(app, *arguments);
+  return [arguments, &common] { return Run(*arguments, common); };
+}
+
+}  // namespace nacre::cli

@@ -1,0 +1,52 @@
+#pragma once
+
+#include "core/error.h"
+#include "render/bsdf/bsdfs.h"
+#include "render/scene.h"
+
+#include <filesystem>
+#include <map>
+#include <pugixml.hpp>
+#include <string>
+#include <vector>
+
+namespace nacre::render {
+
+/// What all parts of the reader share: the text with its lines, the `$name`s, objects
+/// with an id, and the scene being built.
+struct Document {
+  std::string origin;
+  std::string text;
+  std::filesystem::path folder;
+  bool lenient = false;
+  std::map<std::string, std::string> defines;
+  std::map<std::string, BsdfPtr> bsdfs;        ///< by id
+  std::map<std::string, TexturePtr> textures;  ///< by id
+  Scene scene;
+
+  /// "file:line" of a node.
+  std::string Where(const pugi::xml_node& node) const;
+  Error ErrorAt(const pugi::xml_node& node, const std::string& message) const;
+  /// For what isn't known: throws, or with `lenient` makes it a note.
+  void Unknown(const pugi::xml_node& node, const std::string& message);
+  void Note(const pugi::xml_node& node, const std::string& message);
+
+  /// The value with each $name replaced; "" if the attribute isn't there.
+  std::string Attribute(const pugi::xml_node& node, const char* name) const;
+  /// As Attribute, but an error if it isn't there.
+  std::string RequiredAttribute(const pugi::xml_node& node, const char* name) const;
+
+  /// A file named in the scene: relative to the scene's folder. Must exist.
+  std::filesystem::path File(const pugi::xml_node& node, const std::string& name);
+};
+
+/// All numbers of a text, separated by blanks and commas. Throws ErrorAt for anything
+/// else, and for what isn't finite.
+std::vector<double> ParseNumbers(const Document& document,
+                                 const pugi::xml_node& node,
+                                 const std::string& text);
+double ParseNumber(const Document& document,
+                   const pugi::xml_node& node,
+                   const std::string& text);
+
+}  // namespace nacre::render

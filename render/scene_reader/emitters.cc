@@ -1,0 +1,74 @@
+#include "render/scene_reader/objects.h"
+
+#include <numbers>
+
+namespace nacre::render {
+namespace {
+
+constexpr Color kWhite{1, 1, 1};
+
+Vec3 Direction(Element& element) {
+  if (element.Has("direction")) {
+    if (element.Has("toWorld")) {
+      element.Fail("give either 'direction' or 'toWorld'");
+    }
+    const Vec3 direction = element.Point("direction", {0, 0, 1});
+    if (!(Length(direction) > 0)) {
+      element.FailAt("direction", "a direction of length 0");
+    }
+    return Normalized(direction);
+  }
+  return Normalized(element.ToWorld().Vector({0, 0, 1}));
+}
+
+PointLight ReadPoint(Element& element) {
+  if (element.Has("position") && element.Has("toWorld")) {
+    element.Fail("give either 'position' or 'toWorld'");
+  }
+  const Vec3 moved = element.ToWorld().Point({0, 0, 0});
+  return {element.Point("position", moved), element.Spectrum("intensity", kWhite)};
+}
+
+SpotLight ReadSpot(Element& element) {
+  const Transform to_world = element.ToWorld();
+  const double cutoff_deg =
+      InRange(element, "cutoffAngle", element.Float("cutoffAngle", 20), {0.001, 180});
+  const double beam_deg = InRange(element,
+                                  "beamWidth",
+                                  element.Float("beamWidth", 0.75 * cutoff_deg),
+                                  {0, cutoff_deg});
+  constexpr double kDegree = std::numbers::pi / 180;
+  return {to_world.Point({0, 0, 0}),
+          Normalized(to_world.Vector({0, 0, 1})),
+          element.Spectrum("intensity", kWhite),
+          static_cast<float>(cutoff_deg * kDegree),
+          static_cast<float>(beam_deg * kDegree)};
+}
+
+}  // namespace
+
+void ReadEmitter(Element element) {
+  const std::string type = element.type();
+  Light light;
+  light.sampling_weight = static_cast<float>(
+      InRange(element, "samplingWeight", element.Float("samplingWeight", 1), {0, 1e9}));
+  if (type == "point") {
+    light.source = ReadPoint(element);
+  } else if (type == "spot") {
+    light.source = ReadSpot(element);
+  } else if (type == "directional") {
+    const Vec3 direction = Direction(element);
+    light.source = DirectionalLight{direction, element.Spectrum("irradiance", kWhite)};
+  } else if (type == "constant") {
+    light.source = ConstantLight{element.Spectrum("radiance", kWhite)};
+  } else if (type == "area") {
+    element.Fail("an area light belongs inside the shape that shines");
+  } else {
+    UnknownPlugin(element, {"point", "spot", "directional", "constant", "area"});
+    return;
+  }
+  element.Finish();
+  element.document().scene.lights.push_back(light);
+}
+
+}  // namespace nacre::render

@@ -1,0 +1,45 @@
+#pragma once
+
+#include "render/scene_reader/element.h"
+#include "render/scene_reader/words.h"
+
+#include <fmt/format.h>
+#include <map>
+#include <string>
+
+namespace nacre::render {
+
+/// One function a kind of object; each adds to, or is used by, the document's scene.
+TexturePtr ReadTexture(Element element);
+BsdfPtr ReadBsdf(Element element);
+void ReadEmitter(Element element);
+void ReadShape(Element element);
+void ReadSensor(Element element);
+void ReadIntegrator(Element element);
+Translucency ReadSubsurface(Element element);
+
+/// The object that <ref id="…"> of `node` means.
+template <class Object>
+Object FindById(const Document& document,
+                const pugi::xml_node& node,
+                const std::map<std::string, Object>& objects,
+                const char* kind) {
+  const std::string id = document.RequiredAttribute(node, "id");
+  const auto found = objects.find(id);
+  if (found == objects.end()) {
+    std::vector<std::string> known;
+    for (const auto& object : objects) {
+      known.push_back(object.first);
+    }
+    throw document.ErrorAt(
+        node,
+        fmt::format(
+            "no {} with id '{}' above this line{}", kind, id, Suggestion(id, known)));
+  }
+  return found->second;
+}
+
+/// For a plugin that doesn't exist: throws naming the nearest, or notes it.
+void UnknownPlugin(Element& element, const std::vector<std::string>& known);
+
+}  // namespace nacre::render
