@@ -17,9 +17,10 @@ namespace {
 // that fit the first cache.
 constexpr std::size_t kPiece = 1024;
 constexpr std::size_t kBlocks = kPiece / 2;
+constexpr std::size_t kGroup = 64;
 
-// Above it a Poisson variable is a rounded Gaussian for all a camera can tell.
-constexpr float kGaussianAbove = 50.0F;
+// Above it a Poisson variable is a Gaussian one with its skewness put right, rounded.
+constexpr float kGaussianAbove = 20.0F;
 
 struct Draws {
   std::uint32_t photon[kPiece];  // words that decide the number of electrons
@@ -85,8 +86,9 @@ NACRE_SIMD_CLONES void DrawElectrons(const float* __restrict mean,
                                      std::size_t count,
                                      float* __restrict electrons) {
   for (std::size_t k = 0; k < count; ++k) {
-    // Rounded to whole electrons; above 2²² the addition changes nothing that matters.
-    const float drawn = mean[k] + std::sqrt(mean[k]) * Normal(word[k]);
+    const float z = Normal(word[k]);
+    const float skew = (z * z - 1.0F) * (1.0F / 6.0F);  // [Cornish38], first order
+    const float drawn = mean[k] + std::sqrt(mean[k]) * z + skew;
     const float whole = std::floor(drawn + 0.5F);
     electrons[k] = std::min(full_well, std::max(0.0F, whole));
   }
@@ -99,10 +101,10 @@ NACRE_SIMD_CLONES void DrawFewElectrons(const float* __restrict mean,
                                         int most_electrons,
                                         std::size_t count,
                                         float* __restrict electrons) {
-  float u[kPiece];
-  float term[kPiece];
-  float sum[kPiece];
-  float few[kPiece];
+  float u[kGroup];
+  float term[kGroup];
+  float sum[kGroup];
+  float few[kGroup];
   for (std::size_t k = 0; k < count; ++k) {
     u[k] =
         (static_cast<float>(static_cast<std::int32_t>(word[k] >> 8)) + 0.5F) * 0x1p-24F;
@@ -160,7 +162,7 @@ void ExposePiece(const SensorModel& sensor,
   Draws draws;
   Draw(exposure, begin / 2, draws);
   float mean[kPiece];
-  float electrons[kPiece];
+  float electrons[kPiece] = {};
   const auto exposure_us = static_cast<float>(exposure.exposure_us);
   const auto dark =
       static_cast<float>(sensor.dark_electrons_per_us * exposure.exposure_us);
@@ -168,13 +170,19 @@ void ExposePiece(const SensorModel& sensor,
   for (std::size_t k = 0; k < count; ++k) {
     mean[k] = rates[k] * exposure_us + dark;
   }
-  DrawElectrons(mean,
-                draws.photon,
-                static_cast<float>(sensor.full_well_electrons),
-                count,
-                electrons);
-  if (const int most_electrons = MostElectrons(mean, count); most_electrons > 0) {
-    DrawFewElectrons(mean, draws.photon, most_electrons, count, electrons);
+  if (*std::max_element(mean, mean + count) >= kGaussianAbove) {
+    DrawElectrons(mean,
+                  draws.photon,
+                  static_cast<float>(sensor.full_well_electrons),
+                  count,
+                  electrons);
+  }
+  // In short groups, so that only the neighbours of a bright pixel pay for it.
+  for (std::size_t at = 0; at < count; at += kGroup) {
+    const std::size_t size = std::min(kGroup, count - at);
+    if (const int most = MostElectrons(mean + at, size); most > 0) {
+      DrawFewElectrons(mean + at, draws.photon + at, most, size, electrons + at);
+    }
   }
   Convert(sensor, electrons, draws.read, count, counts.data());
 }
