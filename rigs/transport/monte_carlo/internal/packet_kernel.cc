@@ -2,18 +2,24 @@
 // loop takes every lane to its next event: a collision (absorption, scattering, or null
 // where media differ) or a face (reflection, refraction, exit). What happens once a
 // photon is the Roster's.
+// clang-format off: the order matters
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "rigs/transport/monte_carlo/internal/packet_kernel.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format on
+
 #include "core/error.h"
+#include "rigs/transport/monte_carlo/internal/lane_math-inl.h"
 #include "rigs/transport/monte_carlo/internal/packet.h"
 #include "rigs/transport/monte_carlo/threefry.h"
 
+#include <array>
+#include <bit>
+#include <cstdint>
 #include <fmt/format.h>
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "rigs/transport/monte_carlo/internal/packet_kernel.cc"
-#include "rigs/transport/monte_carlo/internal/lane_math-inl.h"
-
-#include <hwy/foreach_target.h>
-#include <hwy/highway.h>
+#include <string>
+#include <vector>
 
 HWY_BEFORE_NAMESPACE();
 namespace nacre::rigs::monte_carlo::internal {
