@@ -91,7 +91,9 @@ SessionManifest ReadManifest(const std::filesystem::path& folder) {
       manifest.rig_hash) {
     throw BadData(origin + ": field 'rig' doesn't match its checksum 'rig_xxh3'");
   }
-  manifest.seed = Get<std::uint64_t>(json, "seed", origin);
+  if (!Get<Json>(json, "seed", origin).is_null()) {
+    manifest.seed = Get<std::uint64_t>(json, "seed", origin);
+  }
   manifest.picture_count = Get<std::int64_t>(json, "picture_count", origin);
   manifest.camera = CameraFromJson(Get<Json>(json, "camera", origin), origin);
   manifest.illuminator =
@@ -114,7 +116,7 @@ void WriteManifest(const std::filesystem::path& folder,
            {"rig_file", manifest.rig_file},
            {"rig_xxh3", manifest.rig_hash},
            {"rig", manifest.rig_text},
-           {"seed", manifest.seed},
+           {"seed", manifest.seed ? Json(*manifest.seed) : Json()},
            {"picture_count", manifest.picture_count},
            {"first_sample_picture", schedule.grid_begin()},
            {"spot_groups", schedule.group_count()},

@@ -24,8 +24,9 @@ struct SessionManifest {
   IlluminatorInfo illuminator;
   std::int64_t picture_count = 0;
   std::optional<ScanMap> scan_map;  ///< once the calibration pictures are taken
-  std::uint64_t seed = 0;           ///< of a simulated rig's noise
-  std::string software_version;     ///< that began the session
+  /// Of a simulated rig's noise, if another than the rig description's.
+  std::optional<std::uint64_t> seed;
+  std::string software_version;  ///< that began the session
 };
 
 /// session.json of a folder. Throws BadData for anything missing or contradictory.

@@ -24,6 +24,17 @@ void MakeFolder(const std::filesystem::path& folder) {
   }
 }
 
+// What a process killed while it wrote the manifest has left behind. Only called under
+// the lock: no living process is writing.
+void RemoveHalfManifests(const std::filesystem::path& folder) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(".session.") && name.ends_with(".tmp.json")) {
+      std::filesystem::remove(entry.path());
+    }
+  }
+}
+
 // The first line in which two texts differ, both versions of it.
 std::string FirstDifference(const std::string& before, const std::string& now) {
   std::istringstream before_lines(before);
@@ -60,7 +71,10 @@ void RequireSame(const std::filesystem::path& folder,
                        FirstDifference(before.rig_text, now.rig_text)));
   }
   if (before.seed != now.seed) {
-    refuse(fmt::format("the seed was {} and is {}", before.seed, now.seed));
+    const auto name = [](const std::optional<std::uint64_t>& seed) {
+      return seed ? std::to_string(*seed) : std::string("the rig's own");
+    };
+    refuse(fmt::format("the seed was {} and is {}", name(before.seed), name(now.seed)));
   }
   if (before.camera.model != now.camera.model ||
       before.camera.serial != now.camera.serial ||
@@ -103,7 +117,7 @@ bool IsGoodFrame(const std::filesystem::path& folder, const JournalEntry& entry)
 SessionManifest MakeManifest(const RigDescription& rig,
                              const CameraInfo& camera,
                              const IlluminatorInfo& illuminator,
-                             std::uint64_t seed) {
+                             std::optional<std::uint64_t> seed) {
   if (illuminator.channels != rig.scanner.channels) {
     throw DeviceError(
         fmt::format("{}: scanner.channels is [{}], but the laser {} has [{}]",
@@ -131,7 +145,9 @@ SessionWriter::SessionWriter(const std::filesystem::path& folder,
       manifest_(manifest),
       rig_(ParseRig(manifest.rig_text, folder / manifest.rig_file)),
       schedule_(rig_),
-      durable_(durable) {}
+      durable_(durable) {
+  RemoveHalfManifests(folder);
+}
 
 SessionWriter SessionWriter::Create(const std::filesystem::path& folder,
                                     const SessionManifest& manifest,

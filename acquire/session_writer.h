@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace nacre::acquire {
@@ -88,6 +89,6 @@ class SessionWriter {
 SessionManifest MakeManifest(const RigDescription& rig,
                              const CameraInfo& camera,
                              const IlluminatorInfo& illuminator,
-                             std::uint64_t seed);
+                             std::optional<std::uint64_t> seed = std::nullopt);
 
 }  // namespace nacre::acquire

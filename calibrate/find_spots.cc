@@ -11,7 +11,7 @@
 namespace nacre::calibrate {
 namespace {
 
-// A spot has several pixels; less is noise or a hot pixel.
+// A spot has several pixels once smoothed; less is noise.
 constexpr int kMinAreaPx = 4;
 
 struct Blob {
@@ -108,8 +108,8 @@ std::vector<PixelPoint> FindSpots(const std::vector<float>& signal,
          "width * height values");
   const cv::Mat picture(height, width, CV_32FC1, const_cast<float*>(signal.data()));
   cv::Mat smooth;
-  cv::medianBlur(picture, smooth, 3);  // takes hot pixels out
-  cv::GaussianBlur(smooth, smooth, cv::Size(), 1.0);
+  // A spot may be sharper than a pixel: smoothing gives it a size, and tames noise.
+  cv::GaussianBlur(picture, smooth, cv::Size(), 1.0);
   double brightest = 0;
   cv::minMaxLoc(smooth, nullptr, &brightest);
   // Spots of one channel differ little, so that one of these levels parts them all from
