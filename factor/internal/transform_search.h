@@ -24,10 +24,11 @@ struct TransformChoice {
 /// Minimises the error that a truncated SVD of ln(R/A + B) makes in R_d on `rd` (rows
 /// are filled slices), each row's total being corrected as the material does. Since
 /// ln(R/A + B) = ln(R + AB) − ln A, the two numbers are c = AB, which sets what counts
-/// as small, and B, which only shifts the matrix; the search runs over a coarse grid of
-/// both, then by golden section along each. c is at most 100 peaks, where the logarithm
-/// has become linear, and at least twice the deepest negative value, so that its
-/// argument stays positive.
+/// as small, and B, which only shifts the matrix; the search takes a coarse grid
+/// of c, then golden sections along c and B. Of the c whose error is within 5 % of the
+/// least the smallest is taken: that serves the tails. c is at most 100 peaks, where
+/// the logarithm has become linear, and at least twice the deepest negative value, so
+/// that its argument stays positive.
 TransformChoice ChooseTransform(const RowMatrix& rd, const TransformSearch& search);
 
 /// The objective for one transform.

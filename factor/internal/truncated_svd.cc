@@ -5,8 +5,6 @@
 #include <Spectra/MatOp/DenseSymMatProd.h>
 #include <Spectra/SymEigsSolver.h>
 #include <algorithm>
-#include <cmath>
-#include <limits>
 
 namespace nacre::factor::internal {
 namespace {
@@ -17,11 +15,6 @@ LeadingEigen SolveDense(const Eigen::MatrixXd& gram, int count) {
           solver.eigenvectors().rightCols(count).rowwise().reverse()};
 }
 
-// Spectra takes a pair for converged at a residual of tolerance · max(ε^(2/3),
-// |value|). With the matrix scaled to ε^(2/3) that is an absolute bound, which the
-// zeros of a rank-deficient matrix meet too.
-const double kSpectraFloor = std::pow(std::numeric_limits<double>::epsilon(), 2.0 / 3);
-
 // Lanczos pays when few pairs of many are wanted. Should it not converge, the dense
 // solver gives the same answer more slowly.
 LeadingEigen Solve(const Eigen::MatrixXd& gram, int count, double tolerance) {
@@ -30,16 +23,23 @@ LeadingEigen Solve(const Eigen::MatrixXd& gram, int count, double tolerance) {
   if (krylov >= n / 2) {
     return SolveDense(gram, count);
   }
-  Spectra::DenseSymMatProd<double> product(gram);
+  // Spectra bounds residuals relative to each eigenvalue, which the zeros of a
+  // rank-deficient matrix never meet. With the trace, which no eigenvalue exceeds,
+  // added to all of them, the bound is relative to the trace; the vectors stay the
+  // same.
+  const Eigen::MatrixXd shifted =
+      gram / gram.trace() + Eigen::MatrixXd::Identity(gram.rows(), gram.cols());
+  Spectra::DenseSymMatProd<double> product(shifted);
   Spectra::SymEigsSolver<Spectra::DenseSymMatProd<double>> solver(
       product, count, krylov);
   solver.init();
   solver.compute(Spectra::SortRule::LargestAlge, 300, tolerance);
-  if (solver.info() != Spectra::CompInfo::Successful ||
-      !solver.eigenvectors().allFinite()) {
+  if (solver.info() != Spectra::CompInfo::Successful) {
     return SolveDense(gram, count);
   }
-  return {solver.eigenvalues(), solver.eigenvectors()};
+  const Eigen::MatrixXd vectors = solver.eigenvectors();
+  const Eigen::MatrixXd images = gram.selfadjointView<Eigen::Lower>() * vectors;
+  return {vectors.cwiseProduct(images).colwise().sum().transpose(), vectors};
 }
 
 }  // namespace
@@ -49,18 +49,16 @@ LeadingEigen ComputeLeadingEigen(const Eigen::MatrixXd& gram,
                                  double tolerance) {
   const auto n = static_cast<int>(gram.rows());
   LeadingEigen result{Eigen::VectorXd(0), Eigen::MatrixXd(n, 0)};
-  const double scale = n > 0 ? gram.diagonal().maxCoeff() : 0;
-  if (!(scale > 0)) {
+  if (!(gram.trace() > 0)) {
     return result;
   }
-  const double factor = kSpectraFloor / scale;
-  result = Solve(gram * factor, std::min(count, n), tolerance);
+  result = Solve(gram, std::min(count, n), tolerance);
   const double least = kRankTolerance * kRankTolerance * result.values(0);
   int rank = 0;
   while (rank < result.values.size() && result.values(rank) > least) {
     ++rank;
   }
-  result.values = (result.values.head(rank) / factor).eval();
+  result.values = result.values.head(rank).eval();
   result.vectors = result.vectors.leftCols(rank).eval();
   return result;
 }

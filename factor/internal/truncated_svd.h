@@ -16,8 +16,8 @@ struct LeadingEigen {
 
 /// Returns at most `count` pairs: fewer if the rest is zero to rounding, which is said
 /// of values below kRankTolerance² of the largest; none for a matrix of zeros. Only the
-/// lower triangle is read. `tolerance` bounds the residual |Gx − λx| over the largest
-/// diagonal entry. Deterministic.
+/// lower triangle is read. `tolerance` bounds the residual |Gx − λx| over the trace.
+/// Deterministic.
 LeadingEigen ComputeLeadingEigen(const Eigen::MatrixXd& gram,
                                  int count,
                                  double tolerance = 1e-13);

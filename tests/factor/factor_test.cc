@@ -96,10 +96,10 @@ TEST(Factor, IsTheTruncatedSvdOfTheTransformedRows) {
 TEST(Factor, TenTermsAddAtMostThreePercent) {
   for (const double noise : {0.0, 1e-3}) {
     const RdDataset dataset =
-        MakeChessboard({.points_x = 48, .points_y = 48, .noise = noise, .seed = 21});
+        MakeChessboard({.points_x = 40, .points_y = 40, .noise = noise, .seed = 21});
     const auto [m, summary] = Factor(dataset, {});
     EXPECT_LT(summary.relative_l2, 0.03) << noise;
-    EXPECT_EQ(summary.bytes, 4 * 3 * (48 * 48 * 11 + 225 * 10));
+    EXPECT_EQ(summary.bytes, 4 * 3 * (40 * 40 * 11 + 225 * 10));
     EXPECT_LT(summary.worst_total, 1e-5);
   }
 }
@@ -165,7 +165,8 @@ TEST(Factor, ThreadCountDoesNotChangeABit) {
     dataset.valid[n] = 0;
   }
   for (const int clusters : {1, 3}) {
-    FactorOptions options{.terms = 6, .clusters = clusters, .thread_count = 1};
+    FactorOptions options{
+        .terms = 6, .clusters = clusters, .sample_rows = 64, .thread_count = 1};
     const Material one = Factor(dataset, options).material;
     for (const int threads : {2, 3}) {
       options.thread_count = threads;
@@ -185,7 +186,8 @@ TEST(Factor, StreamingFromAFileIsTheSame) {
 }
 
 TEST(Factor, ClustersLowerTheErrorAtEqualTerms) {
-  const RdDataset dataset = MakeChessboard({.points_x = 40, .points_y = 40});
+  const RdDataset dataset =
+      MakeChessboard({.points_x = 32, .points_y = 32, .channels = 1});
   const FactorSummary one = Factor(dataset, {.terms = 3}).summary;
   const auto [m, four] = Factor(dataset, {.terms = 3, .clusters = 4});
   EXPECT_EQ(four.clusters, 4);
@@ -207,7 +209,8 @@ TEST(Factor, MoreTermsNeverHurtTheCurveAndItsEndIsTheResult) {
 }
 
 TEST(Factor, BytesAndErrorChooseTheTerms) {
-  const RdDataset dataset = MakeChessboard({.points_x = 24, .points_y = 24});
+  const RdDataset dataset =
+      MakeChessboard({.points_x = 24, .points_y = 24, .channels = 1});
   const FactorSummary full = Factor(dataset, {.terms = 12}).summary;
   const double budget = 0.5 * static_cast<double>(full.bytes);
   const FactorSummary small = Factor(dataset, {.terms = 12, .bytes = budget}).summary;

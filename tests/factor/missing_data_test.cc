@@ -69,7 +69,7 @@ TEST(MissingData, RoundsOfPredictionHelp) {
       Remove(holed, n);
     }
   }
-  FactorOptions options{.terms = 6, .fill_rounds = 0};
+  FactorOptions options{.method = "svd", .terms = 6, .fill_rounds = 0};
   const double once = ErrorAgainst(Factor(holed, options).material, truth);
   options.fill_rounds = 3;
   EXPECT_LT(ErrorAgainst(Factor(holed, options).material, truth), 0.9 * once);
