@@ -13,7 +13,7 @@ namespace {
 
 /// Nearer than this many pitches, a patch is four sources instead of one: R_d changes
 /// over its own extent.
-constexpr float kNearPitches = 2.5F;
+constexpr float kNearPitches = 2;
 
 Vec2 operator+(Vec2 a, Vec2 b) {
   return {a.x + b.x, a.y + b.y};
@@ -52,7 +52,8 @@ class FactoredGather final : public Subsurface {
       if (d.squared > kNearPitches * kNearPitches) {
         sum += Lookup(source, d.plane, d.squared) * source.flux_w;
       } else {
-        sum += LookupExtended(source, d) * (source.flux_w * 0.25F);
+        sum += LookupExtended(source, d, source.extent_a, source.extent_b) *
+               (source.flux_w * 0.25F);
       }
     };
     const auto add_node = [&](std::int32_t index, float r2_mm2) {
@@ -66,7 +67,9 @@ class FactoredGather final : public Subsurface {
       }
       const Source& source = patches_[static_cast<std::size_t>(node.brightest)];
       const Offset d = Project(x_o.position_mm - node.centre_mm, source);
-      sum += Lookup(source, d.plane, d.squared) * node_flux_w_[i];
+      const float spread = std::sqrt(node.variance_mm2) * per_mm_;
+      sum += LookupExtended(source, d, {spread, 0}, {0, spread}) *
+             (node_flux_w_[i] * 0.25F);
     };
     tree_.Visit(x_o.position_mm,
                 max_relative_extent_,
@@ -141,12 +144,16 @@ class FactoredGather final : public Subsurface {
     return windows_->At(source.window, std::sqrt(squared), 0);
   }
 
-  /// Four times the mean over the patch, by the product of two two-point Gauss rules.
-  ColorLanes LookupExtended(const Source& source, const Offset& d) const {
+  /// Four times the mean over a patch of which `a` and `b` are the standard deviations
+  /// along its axes, by the product of two two-point Gauss rules.
+  ColorLanes LookupExtended(const Source& source,
+                            const Offset& d,
+                            Vec2 a,
+                            Vec2 b) const {
     const float outside =
         std::max(0.0F, d.squared - d.plane.x * d.plane.x - d.plane.y * d.plane.y);
-    const Vec2 sum = source.extent_a + source.extent_b;
-    const Vec2 difference = source.extent_a - source.extent_b;
+    const Vec2 sum = a + b;
+    const Vec2 difference = a - b;
     ColorLanes total;
     for (const Vec2 p :
          {d.plane + sum, d.plane - sum, d.plane + difference, d.plane - difference}) {

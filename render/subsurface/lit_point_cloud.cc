@@ -20,10 +20,11 @@ constexpr int kBitsPerAxis = 20;
 /// patches.
 constexpr float kLatticeShift = 0.3819660F;
 
+/// Voxel and side in one number: groups are what has the same.
 struct KeyedPoint {
-  std::uint64_t voxel;
-  int side;
+  std::uint64_t key;
   const LitPoint* point;
+  std::uint64_t Voxel() const { return key >> 3; }
 };
 
 std::uint64_t SpreadBits(std::uint64_t v) {
@@ -34,12 +35,12 @@ std::uint64_t SpreadBits(std::uint64_t v) {
   return (v | (v << 2)) & 0x1249249249249249u;
 }
 
-int DominantSide(Vec3 n) {
+std::uint64_t DominantSide(Vec3 n) {
   const float ax = std::abs(n.x);
   const float ay = std::abs(n.y);
   const float az = std::abs(n.z);
   const int axis = ax >= ay && ax >= az ? 0 : ay >= az ? 1 : 2;
-  return 2 * axis + (n[axis] < 0 ? 1 : 0);
+  return static_cast<std::uint64_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
 }
 
 std::array<std::int64_t, 3> VoxelOf(Vec3 p, float side_mm) {
@@ -76,7 +77,7 @@ std::vector<KeyedPoint> SortIntoVoxels(const std::vector<LitPoint>& lit,
       low[axis] = std::min(low[axis], voxel[axis]);
       high[axis] = std::max(high[axis], voxel[axis]);
     }
-    keyed.push_back({0, DominantSide(point.point.normal), &point});
+    keyed.push_back({DominantSide(point.point.normal), &point});
   }
   for (std::size_t axis = 0; axis < 3 && !keyed.empty(); ++axis) {
     if (high[axis] - low[axis] >= (std::int64_t{1} << kBitsPerAxis)) {
@@ -91,17 +92,12 @@ std::vector<KeyedPoint> SortIntoVoxels(const std::vector<LitPoint>& lit,
   for (KeyedPoint& k : keyed) {
     const auto voxel = VoxelOf(k.point->point.position_mm, side_mm);
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      k.voxel |= SpreadBits(static_cast<std::uint64_t>(voxel[axis] - low[axis]))
-                 << axis;
+      k.key |= SpreadBits(static_cast<std::uint64_t>(voxel[axis] - low[axis]))
+               << (axis + 3);
     }
   }
-  const auto order = [](const KeyedPoint& k) {
-    const Vec3 p = k.point->point.position_mm;
-    const Color e = k.point->flux_density;
-    return std::tuple(k.voxel, k.side, p.x, p.y, p.z, k.point->area_mm2, e.x, e.y, e.z);
-  };
-  std::sort(keyed.begin(), keyed.end(), [&](const KeyedPoint& a, const KeyedPoint& b) {
-    return a.voxel != b.voxel ? a.voxel < b.voxel : order(a) < order(b);
+  std::sort(keyed.begin(), keyed.end(), [](const KeyedPoint& a, const KeyedPoint& b) {
+    return a.key < b.key;
   });
   return keyed;
 }
@@ -118,6 +114,19 @@ void SetAxes(Patch& patch, const Frame& frame, double a, double b, double c) {
   const auto shorter = static_cast<float>(std::sqrt(std::max(0.0, mean - split)));
   patch.axis_a_mm = frame.ToWorld({u * longer, v * longer, 0});
   patch.axis_b_mm = frame.ToWorld({-v * shorter, u * shorter, 0});
+}
+
+const SurfacePoint& NearestMember(std::span<const KeyedPoint> members, Vec3 position) {
+  const auto distance2 = [&](const KeyedPoint& k) {
+    const Vec3 d = k.point->point.position_mm - position;
+    return Dot(d, d);
+  };
+  return std::min_element(members.begin(),
+                          members.end(),
+                          [&](const KeyedPoint& a, const KeyedPoint& b) {
+                            return distance2(a) < distance2(b);
+                          })
+      ->point->point;
 }
 
 Patch MergePoints(std::span<const KeyedPoint> members) {
@@ -146,18 +155,12 @@ Patch MergePoints(std::span<const KeyedPoint> members) {
                 static_cast<float>(v[2] * scale)};
   };
   const Vec3 position = to_vec(centre, 1 / weight_sum);
-  const auto nearest = std::min_element(
-      members.begin(), members.end(), [&](const KeyedPoint& a, const KeyedPoint& b) {
-        const Vec3 da = a.point->point.position_mm - position;
-        const Vec3 db = b.point->point.position_mm - position;
-        return Dot(da, da) < Dot(db, db);
-      });
   Patch patch;
-  patch.point = nearest->point->point;
+  patch.point = NearestMember(members, position);
   patch.point.position_mm = position;
   patch.flux_w = to_vec(flux, 1);
   patch.area_mm2 = static_cast<float>(area);
-  patch.voxel = members.front().voxel;
+  patch.voxel = members.front().Voxel();
   if (std::hypot(normal[0], normal[1], normal[2]) > 1e-3 * area) {
     patch.point.normal = Normalized(to_vec(normal, 1));
   }
@@ -183,21 +186,33 @@ Patch MergePoints(std::span<const KeyedPoint> members) {
   return patch;
 }
 
+/// Calls visit(members) for each group; members come in an order of their own, whatever
+/// that of the points was.
+template <class Visitor>
+void ForEachGroup(std::vector<KeyedPoint> keyed, Visitor&& visit) {
+  const auto order = [](const KeyedPoint& k) {
+    const Vec3 p = k.point->point.position_mm;
+    const Color e = k.point->flux_density;
+    return std::tuple(p.x, p.y, p.z, k.point->area_mm2, e.x, e.y, e.z);
+  };
+  for (auto begin = keyed.begin(); begin != keyed.end();) {
+    const auto end = std::find_if(
+        begin, keyed.end(), [&](const KeyedPoint& k) { return k.key != begin->key; });
+    std::sort(begin, end, [&](const KeyedPoint& a, const KeyedPoint& b) {
+      return order(a) < order(b);
+    });
+    visit(std::span<const KeyedPoint>(begin, end));
+    begin = end;
+  }
+}
+
 }  // namespace
 
 std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit, float side_mm) {
   Expect(side_mm > 0, "patches have a positive side");
-  const std::vector<KeyedPoint> keyed = SortIntoVoxels(lit, side_mm);
   std::vector<Patch> patches;
-  for (std::size_t begin = 0; begin < keyed.size();) {
-    std::size_t end = begin + 1;
-    while (end < keyed.size() && keyed[end].voxel == keyed[begin].voxel &&
-           keyed[end].side == keyed[begin].side) {
-      ++end;
-    }
-    patches.push_back(MergePoints(std::span(keyed).subspan(begin, end - begin)));
-    begin = end;
-  }
+  ForEachGroup(SortIntoVoxels(lit, side_mm),
+               [&](auto members) { patches.push_back(MergePoints(members)); });
   return patches;
 }
 

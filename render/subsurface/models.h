@@ -19,7 +19,7 @@ struct DipoleParameters {
 struct DipoleOptions {
   /// A cluster of patches counts as one source if its diameter is below this fraction
   /// of its distance. 0 gathers every patch.
-  double max_relative_extent = 0.35;
+  double max_relative_extent = 0.5;
   /// Side of the patches in transport mean free paths of the most scattering channel.
   double patch_mean_free_paths = 0.8;
 
@@ -44,7 +44,7 @@ std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parame
 struct FactoredOptions {
   double patches_per_pitch = 2;  ///< patch side = pitch / this
   /// As for the dipole; clusters are used from a few pitches on.
-  double max_relative_extent = 0.35;
+  double max_relative_extent = 0.5;
   double window_cache_mb = 256;  ///< for evaluated windows, at most
 
   template <class Self, class Visitor>

@@ -50,19 +50,23 @@ class Meeting {
   std::size_t count_ = 0;
 };
 
-/// What bilinear interpolation between all cells has within the 3 × 3 ones, in cell
-/// areas. As it is used outside of them, exactly this has to remain inside. A tent has
-/// 1/8 of its weight beyond each border, half a pitch from its centre.
-double LightInside(const std::array<double, kCells * kCells>& cells) {
-  constexpr std::array<double, kCells> kShare{0.125, 0.875, 1, 0.875, 0.125};
-  double by_tents = 0;
-  for (std::size_t row = 0; row < kCells; ++row) {
-    for (std::size_t column = 0; column < kCells; ++column) {
-      const double cell = cells[row * kCells + column];
-      by_tents += kShare[row] * kShare[column] * cell;
+/// What each of the 3 × 3 cells has to hold. Outside of them, interpolation between
+/// cells goes on as usual, and a tent has 1/8 of its weight beyond each border, half a
+/// pitch from its centre: so much of the outer cells' light lies outside, and so much
+/// of the next ones' inside. The cell in the middle keeps all of its own.
+double Share(const std::array<double, kCells * kCells>& cells, int column, int row) {
+  const auto along = [](int k, int towards) {
+    return towards == k ? (k == 2 ? 1.0 : 0.875)
+                        : (k != 2 && towards == 2 * k - 2 ? 0.125 : 0.0);
+  };
+  double sum = 0;
+  for (int y = 0; y < kCells; ++y) {
+    for (int x = 0; x < kCells; ++x) {
+      sum += along(column, x) * along(row, y) *
+             cells[static_cast<std::size_t>(y * kCells + x)];
     }
   }
-  return by_tents;
+  return sum;
 }
 
 /// Weight of a node in the integral over the 3 × 3 cells, in cell areas.
@@ -80,16 +84,18 @@ Plane Refine(const std::array<double, kCells * kCells>& cells) {
       nodes[NodeIndex(i, j)] = rim ? meeting.Mean() : HarmonicMean(meeting.values());
     }
   }
+  double target = 0;
   for (int j = 1; j < kNodes; j += 2) {
     for (int i = 1; i < kNodes; i += 2) {
       const auto at = [&](int x, int y) { return nodes[NodeIndex(i + x, j + y)]; };
       const double corners = at(-1, -1) + at(1, -1) + at(-1, 1) + at(1, 1);
       const double sides = at(0, -1) + at(-1, 0) + at(1, 0) + at(0, 1);
-      const double mean = at(0, 0);
-      nodes[NodeIndex(i, j)] = std::max(0.0, 4 * mean - corners / 4 - sides / 2);
+      const double share = Share(cells, (i + 1) / 2, (j + 1) / 2);
+      target += share;
+      nodes[NodeIndex(i, j)] = std::max(0.0, 4 * share - corners / 4 - sides / 2);
     }
   }
-  // What the rim and the clamping have added or taken goes to the nodes in proportion.
+  // What clamping has added is taken from all nodes in proportion.
   double interior = 0;
   double rim = 0;
   for (int j = 0; j < kNodes; ++j) {
@@ -98,11 +104,10 @@ Plane Refine(const std::array<double, kCells * kCells>& cells) {
       (on_rim ? rim : interior) += Weight(i, j) * nodes[NodeIndex(i, j)];
     }
   }
-  const double target = LightInside(cells) - rim;
-  if (interior > 0 && target > 0) {
+  if (interior > 0 && target > rim) {
     for (int j = 1; j < kNodes - 1; ++j) {
       for (int i = 1; i < kNodes - 1; ++i) {
-        nodes[NodeIndex(i, j)] *= target / interior;
+        nodes[NodeIndex(i, j)] *= (target - rim) / interior;
       }
     }
   }

@@ -131,7 +131,7 @@ TEST(DipoleGather, ClustersAgreeWithEveryPatchOnItsOwn) {
     const SurfacePoint at = SpherePoint(8, u, 0.9F - 1.7F * u);
     for (int c = 0; c < 3; ++c) {
       const float expected = b->Exitance(at)[c];
-      EXPECT_NEAR(a->Exitance(at)[c], expected, 0.005F * expected + 2e-4F) << i;
+      EXPECT_NEAR(a->Exitance(at)[c], expected, 0.01F * expected + 3e-4F) << i;
     }
   }
 }
