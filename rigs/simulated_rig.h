@@ -14,8 +14,9 @@
 namespace nacre::rigs {
 
 struct SimulatedRigOptions {
-  std::optional<std::uint64_t> seed;  ///< instead of the file's [simulated] seed
-  int thread_count = 0;               ///< 0: all cores; changes no picture
+  std::optional<std::uint64_t> seed =
+      std::nullopt;      ///< instead of the file's [simulated] seed
+  int thread_count = 0;  ///< 0: all cores; changes no picture
 };
 
 /// A rig that exists only in a rig file of kind "simulated": its [simulated] table says

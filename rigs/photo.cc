@@ -1,0 +1,153 @@
+#include "rigs/photo.h"
+
+#include "core/error.h"
+#include "core/fresnel.h"
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <memory>
+
+namespace nacre::rigs {
+namespace {
+
+// The phantom with a grid point in each pixel and a window that reaches as far as light
+// does, but no farther than the picture.
+Phantom WithPixelGrid(Phantom phantom, const ExrPart& image) {
+  const acquire::GridDescription grid = phantom.grid;
+  if (grid.points_x == 0) {
+    throw BadData("the phantom has no [grid], so the picture's area isn't known");
+  }
+  const double pixel_mm = grid.points_x * grid.pitch_mm / image.width;
+  const double height_mm = grid.points_y * grid.pitch_mm / image.height;
+  if (std::abs(pixel_mm - height_mm) > 1e-6 * pixel_mm) {
+    throw BadData(fmt::format(
+        "{} × {} pixels over {:g} × {:g} mm aren't square: use the grid's aspect ratio",
+        image.width,
+        image.height,
+        grid.points_x * grid.pitch_mm,
+        grid.points_y * grid.pitch_mm));
+  }
+  phantom.grid = {};
+  phantom.grid.pitch_mm = pixel_mm;
+  phantom.grid.points_x = image.width;
+  phantom.grid.points_y = image.height;
+  return phantom;
+}
+
+int CoreFor(const Phantom& phantom, Solver solver, int thread_count) {
+  Phantom without_grid = phantom;
+  without_grid.grid = {};
+  const auto transport = MakeTransport(without_grid, solver, thread_count);
+  double reach_mm = 0;
+  for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
+    reach_mm = std::max(reach_mm, transport->ReachMm(c));
+  }
+  const int radius =
+      std::min(static_cast<int>(std::ceil(reach_mm / phantom.grid.pitch_mm)),
+               std::max(phantom.grid.points_x, phantom.grid.points_y) - 1);
+  return 2 * radius + 1;
+}
+
+struct Scene {
+  const Transport* transport;
+  const ExrPart* image;
+  std::vector<std::size_t> image_channel;  // of each of the phantom's
+};
+
+// Adds what leaves because of the light that falls on one pixel.
+void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exitance) {
+  const Phantom& phantom = scene.transport->phantom();
+  const acquire::GridDescription& grid = phantom.grid;
+  const std::size_t pixels = scene.image->PixelCount();
+  const auto at = static_cast<std::size_t>(row * grid.points_x + column);
+  const auto light = [&](std::size_t c) {
+    return scene.image->Channel(scene.image_channel[c])[at];
+  };
+  bool is_dark = true;
+  for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
+    is_dark = is_dark && light(c) == 0.0F;
+  }
+  if (is_dark) {
+    return;
+  }
+  const Window window = scene.transport->WindowAround(grid.Point(column, row));
+  const int radius = grid.core / 2;
+  const auto entering = static_cast<float>(FresnelTransmittance(1, phantom.slab.eta) *
+                                           grid.pitch_mm * grid.pitch_mm);
+  const int first_column = std::max(0, column - radius);
+  const int last_column = std::min(grid.points_x - 1, column + radius);
+  for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
+    const float flux = entering * light(c);
+    for (int y = std::max(0, row - radius);
+         y <= std::min(grid.points_y - 1, row + radius);
+         ++y) {
+      const std::size_t from = (c * static_cast<std::size_t>(grid.core) +
+                                static_cast<std::size_t>(y - row + radius)) *
+                                   static_cast<std::size_t>(grid.core) +
+                               static_cast<std::size_t>(first_column - column + radius);
+      const std::size_t to =
+          c * pixels + static_cast<std::size_t>(y * grid.points_x + first_column);
+      const auto count = static_cast<std::size_t>(last_column - first_column + 1);
+      for (std::size_t k = 0; k < count; ++k) {
+        exitance[to + k] += flux * window.rd[from + k];
+      }
+    }
+  }
+}
+
+}  // namespace
+
+ExrPart PhotographUnder(const Phantom& phantom,
+                        Solver solver,
+                        const ExrPart& illumination,
+                        int thread_count,
+                        const ProgressFunction& progress) {
+  Phantom by_pixel = WithPixelGrid(phantom, illumination);
+  by_pixel.grid.core = CoreFor(by_pixel, solver, thread_count);
+  const auto transport = MakeTransport(by_pixel, solver, thread_count);
+  Scene scene{transport.get(), &illumination, {}};
+  for (const std::string& channel : phantom.channels) {
+    const int index = illumination.FindChannel(channel);
+    if (index < 0) {
+      throw BadData("the illumination has no channel " + channel +
+                    ", which the phantom has");
+    }
+    scene.image_channel.push_back(static_cast<std::size_t>(index));
+  }
+  ExrPart result;
+  result.width = illumination.width;
+  result.height = illumination.height;
+  result.channels = phantom.channels;
+  const std::size_t size = phantom.channels.size() * illumination.PixelCount();
+  result.values.assign(size, 0.0F);
+  // Pictures of parts of the light, added in order: the same sum on any thread count.
+  constexpr int kParts = 8;
+  for (int first_row = 0; first_row < illumination.height; first_row += kParts) {
+    std::vector<std::vector<float>> parts(kParts);
+    ParallelFor(kParts, thread_count, [&](std::int64_t part) {
+      const int row = first_row + static_cast<int>(part);
+      if (row < illumination.height) {
+        auto& exitance = parts[static_cast<std::size_t>(part)];
+        exitance.assign(size, 0.0F);
+        for (int column = 0; column < illumination.width; ++column) {
+          AddPixel(scene, column, row, exitance);
+        }
+      }
+    });
+    for (const std::vector<float>& part : parts) {
+      for (std::size_t k = 0; k < part.size(); ++k) {
+        result.values[k] += part[k];
+      }
+    }
+    Report(progress,
+           {"photo",
+            std::min(first_row + kParts, illumination.height),
+            illumination.height,
+            ""});
+  }
+  return result;
+}
+
+}  // namespace nacre::rigs
