@@ -27,7 +27,7 @@ struct Options {
 
 /// What to count beside the totals. A count of 0 leaves a table out.
 struct TallyRequest {
-  PointMm window_centre;
+  PointMm window_centre{};
   int window_core = 0;  ///< cells a side, row by row from the top (+y)
   double window_pitch_mm = 0;
   int ring_count = 0;  ///< rings around window_centre, at the top

@@ -9,7 +9,7 @@ namespace nacre::rigs::monte_carlo {
 
 /// Light that arrives on the top surface.
 struct Source {
-  PointMm centre;  ///< x_i
+  PointMm centre{};  ///< x_i
   BeamShape shape = BeamShape::kPencil;
   double width_mm = 0;   ///< as Beam::width_mm, measured on the surface
   double angle_rad = 0;  ///< in air, from the normal, towards +x

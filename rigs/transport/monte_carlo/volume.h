@@ -35,7 +35,7 @@ struct VoxelGrid {
   std::array<double, 3> size_mm{};  ///< of one voxel
   double left_mm = 0;               ///< x of the grid's left face
   double lower_mm = 0;              ///< y of its lower face
-  std::vector<std::uint16_t> medium;
+  std::vector<std::uint16_t> medium{};
 
   std::size_t MediumAt(double x_mm, double y_mm, double depth_mm) const;
 };
