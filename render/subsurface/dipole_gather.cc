@@ -24,10 +24,10 @@ class DipoleGather final : public Subsurface {
         tree_(std::move(patches)),
         max_relative_extent_(static_cast<float>(max_relative_extent)) {
     for (const Patch& patch : tree_.patches()) {
-      patches_.push_back({ToLanes(patch.flux_w), Disc2(patch)});
+      patches_.push_back({ToLanes(patch.flux_w), patch.point.normal, Disc2(patch)});
     }
     for (const PatchTree::Node& node : tree_.nodes()) {
-      nodes_.push_back({ToLanes(node.flux_w), node.variance_mm2});
+      nodes_.push_back({ToLanes(node.flux_w), node.normal, node.variance_mm2});
     }
   }
 
@@ -37,13 +37,15 @@ class DipoleGather final : public Subsurface {
         x_o.position_mm,
         max_relative_extent_,
         table_.reach_mm(),
-        [&](std::int32_t node, float r2_mm2) {
+        [&](std::int32_t node, Vec3 d_mm) {
           const Source& source = nodes_[static_cast<std::size_t>(node)];
-          table_.AddFar(r2_mm2, source.extent_mm2, source.flux_w, sum);
+          table_.AddFar(
+              DistanceOf(d_mm, source), source.extent_mm2, source.flux_w, sum);
         },
-        [&](std::int32_t patch, float r2_mm2) {
+        [&](std::int32_t patch, Vec3 d_mm) {
           const Source& source = patches_[static_cast<std::size_t>(patch)];
-          table_.AddDisc(r2_mm2, source.extent_mm2, source.flux_w, sum);
+          table_.AddDisc(
+              DistanceOf(d_mm, source), source.extent_mm2, source.flux_w, sum);
         });
     return {sum.v[0], sum.v[1], sum.v[2]};
   }
@@ -51,9 +53,15 @@ class DipoleGather final : public Subsurface {
  private:
   struct Source {
     ColorLanes flux_w;
+    Vec3 normal;
     float extent_mm2;  ///< squared radius of a patch, variance of a node
   };
 
+  static DipoleTable::Distance DistanceOf(Vec3 d_mm, const Source& source) {
+    const float squared = Dot(d_mm, d_mm);
+    const float out_of_plane = Dot(d_mm, source.normal);
+    return {squared, squared - out_of_plane * out_of_plane};
+  }
   static float Disc2(const Patch& patch) {
     return patch.area_mm2 / std::numbers::pi_v<float>;
   }

@@ -44,19 +44,18 @@ double DipoleProfile::Rd(double r_mm) const {
   return albedo_ / (4 * pi) * sum;
 }
 
-double DipoleProfile::HalfLaplacian(double r_mm) const {
-  // As a function of q = r², ∇² = 4 ∂/∂q + 4 q ∂²/∂q².
-  double sum = 0;
+DipoleProfile::Spread DipoleProfile::SpreadTerms(double r_mm) const {
+  // With q = r²: R'/r = 2 dR/dq and (R'' − R'/r)/(2 r²) = 2 d²R/dq².
+  Spread sum{0, 0};
   for (const double z : {z_real_, z_virtual_}) {
     const double d = std::hypot(r_mm, z);
     const double s = sigma_tr_ * d;
     const double d5 = d * d * d * d * d;
-    const double decay = z * std::exp(-s);
-    const double first = -decay * (3 + s * (3 + s)) / (2 * d5);
-    const double second = decay * (15 + s * (15 + s * (6 + s))) / (4 * d5 * d * d);
-    sum += 2 * first + 2 * r_mm * r_mm * second;
+    const double decay = albedo_ / (4 * pi) * z * std::exp(-s);
+    sum.slope -= decay * (3 + s * (3 + s)) / d5;
+    sum.bend += decay * (15 + s * (15 + s * (6 + s))) / (2 * d5 * d * d);
   }
-  return albedo_ / (4 * pi) * sum;
+  return sum;
 }
 
 double DipoleProfile::FluxWithin(double r_mm) const {

@@ -19,9 +19,15 @@ class DipoleProfile {
   /// R_d in mm⁻² at distance r.
   double Rd(double r_mm) const;
 
-  /// ½ (∂²/∂x² + ∂²/∂y²) R_d in mm⁻⁴: a source whose flux has variance v along each
-  /// direction in the plane gives R_d + v · HalfLaplacian at distances well beyond √v.
-  double HalfLaplacian(double r_mm) const;
+  /// What a source becomes that isn't a point but spreads with variance v along each
+  /// direction of a plane, seen from well beyond √v at a distance r of which p lies in
+  /// that plane: R_d + v (slope + p² bend), to second order. With p = r the bracket is
+  /// ½ ∇² R_d, whose integral vanishes: the total stays.
+  struct Spread {
+    double slope;  ///< R_d'/r, mm⁻⁴
+    double bend;   ///< (R_d'' − R_d'/r) / (2 r²), mm⁻⁶
+  };
+  Spread SpreadTerms(double r_mm) const;
 
   /// ∫₀^r R_d 2πs ds: what leaves within r of the beam.
   double FluxWithin(double r_mm) const;

@@ -75,7 +75,9 @@ void DipoleTable::FillFar(const std::array<DipoleProfile, 3>& profiles) {
     for (std::size_t c = 0; c < 3; ++c) {
       const double r = far_axis_.Distance(i);
       far_[i].rd.v[c] = static_cast<float>(profiles[c].Rd(r));
-      far_[i].half_laplacian.v[c] = static_cast<float>(profiles[c].HalfLaplacian(r));
+      const DipoleProfile::Spread spread = profiles[c].SpreadTerms(r);
+      far_[i].slope.v[c] = static_cast<float>(spread.slope);
+      far_[i].bend.v[c] = static_cast<float>(spread.bend);
     }
   }
 }
@@ -102,16 +104,16 @@ void DipoleTable::FillNear(const std::array<DipoleProfile, 3>& profiles,
   });
 }
 
-void DipoleTable::AddDisc(float r2_mm2,
+void DipoleTable::AddDisc(const Distance& distance,
                           float disc2_mm2,
                           const ColorLanes& flux,
                           ColorLanes& sum) const {
   constexpr auto kFar2 = static_cast<float>(kFarRadii * kFarRadii);
-  if (r2_mm2 > kFar2 * disc2_mm2) {
-    AddFar(r2_mm2, 0.25F * disc2_mm2, flux, sum);
+  if (distance.squared_mm2 > kFar2 * disc2_mm2) {
+    AddFar(distance, 0.25F * disc2_mm2, flux, sum);
     return;
   }
-  const auto place = near_axis_.Find(r2_mm2);
+  const auto place = near_axis_.Find(distance.squared_mm2);
   const float disc = disc2_mm2 * discs_per_mm2_;
   const std::uint32_t row = std::min(static_cast<std::uint32_t>(disc), kDiscs - 2);
   const float row_fraction = disc - static_cast<float>(row);
@@ -122,16 +124,16 @@ void DipoleTable::AddDisc(float r2_mm2,
                     row_fraction);
 }
 
-void DipoleTable::AddFar(float r2_mm2,
+void DipoleTable::AddFar(const Distance& distance,
                          float variance_mm2,
                          const ColorLanes& flux,
                          ColorLanes& sum) const {
-  const auto place = far_axis_.Find(r2_mm2);
+  const auto place = far_axis_.Find(distance.squared_mm2);
   const FarEntry& a = far_[place.index];
   const FarEntry& b = far_[place.index + 1];
-  sum +=
-      flux * (Mix(a.rd, b.rd, place.fraction) +
-              Mix(a.half_laplacian, b.half_laplacian, place.fraction) * variance_mm2);
+  const ColorLanes spread = Mix(a.slope, b.slope, place.fraction) +
+                            Mix(a.bend, b.bend, place.fraction) * distance.in_plane_mm2;
+  sum += flux * (Mix(a.rd, b.rd, place.fraction) + spread * variance_mm2);
 }
 
 }  // namespace nacre::render

@@ -49,15 +49,21 @@ class DipoleTable {
               double largest_disc_mm,
               int thread_count);
 
+  /// From a source to x_o.
+  struct Distance {
+    float squared_mm2;   ///< in space
+    float in_plane_mm2;  ///< of it, in the tangent plane of the source; squared
+  };
+
   /// Adds flux · (R_d averaged over a disc of squared radius `disc2_mm2`) to sum.
-  void AddDisc(float r2_mm2,
+  void AddDisc(const Distance& distance,
                float disc2_mm2,
                const ColorLanes& flux,
                ColorLanes& sum) const;
 
   /// Adds flux · R_d for a source, well away, of variance `variance_mm2` along each
-  /// direction.
-  void AddFar(float r2_mm2,
+  /// direction of its tangent plane.
+  void AddFar(const Distance& distance,
               float variance_mm2,
               const ColorLanes& flux,
               ColorLanes& sum) const;
@@ -68,7 +74,8 @@ class DipoleTable {
  private:
   struct FarEntry {
     ColorLanes rd;
-    ColorLanes half_laplacian;
+    ColorLanes slope;  ///< as DipoleProfile::Spread
+    ColorLanes bend;
   };
   void FillFar(const std::array<DipoleProfile, 3>& profiles);
   void FillNear(const std::array<DipoleProfile, 3>& profiles,

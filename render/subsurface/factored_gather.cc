@@ -44,10 +44,9 @@ class FactoredGather final : public Subsurface {
   Color Exitance(const SurfacePoint& x_o) const override {
     ColorLanes sum;
     const float near_mm = kNearPitches * windows_->pitch_mm();
-    const auto add_patch = [&](std::int32_t index) {
+    const auto add_patch = [&](std::int32_t index, Vec3 d_mm) {
       const auto i = static_cast<std::size_t>(index);
       const Source& source = patches_[i];
-      const Vec3 d_mm = x_o.position_mm - tree_.patches()[i].point.position_mm;
       const Offset d = Project(d_mm, source);
       if (d.squared > kNearPitches * kNearPitches) {
         sum += Lookup(source, d.plane, d.squared) * source.flux_w;
@@ -56,26 +55,24 @@ class FactoredGather final : public Subsurface {
                (source.flux_w * 0.25F);
       }
     };
-    const auto add_node = [&](std::int32_t index, float r2_mm2) {
+    const auto add_node = [&](std::int32_t index, Vec3 d_mm) {
       const auto i = static_cast<std::size_t>(index);
       const PatchTree::Node& node = tree_.nodes()[i];
-      if (r2_mm2 < near_mm * near_mm) {
+      if (Dot(d_mm, d_mm) < near_mm * near_mm) {
         for (std::int32_t p = node.begin; p < node.end; ++p) {
-          add_patch(p);
+          const Vec3 centre =
+              tree_.patches()[static_cast<std::size_t>(p)].point.position_mm;
+          add_patch(p, x_o.position_mm - centre);
         }
         return;
       }
       const Source& source = patches_[static_cast<std::size_t>(node.brightest)];
-      const Offset d = Project(x_o.position_mm - node.centre_mm, source);
+      const Offset d = Project(d_mm, source);
       const float spread = std::sqrt(node.variance_mm2) * per_mm_;
       sum += LookupExtended(source, d, {spread, 0}, {0, spread}) *
              (node_flux_w_[i] * 0.25F);
     };
-    tree_.Visit(x_o.position_mm,
-                max_relative_extent_,
-                reach_mm_,
-                add_node,
-                [&](std::int32_t index, float) { add_patch(index); });
+    tree_.Visit(x_o.position_mm, max_relative_extent_, reach_mm_, add_node, add_patch);
     return {sum.v[0], sum.v[1], sum.v[2]};
   }
 

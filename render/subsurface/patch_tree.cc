@@ -21,6 +21,7 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
   float brightest = 0;
   std::array<double, 3> flux{};
   std::array<double, 3> centre{};
+  Vec3 normal;
   for (std::int32_t p = begin; p < end; ++p) {
     const Patch& patch = patches[static_cast<std::size_t>(p)];
     const float weight = patch.flux_w.x + patch.flux_w.y + patch.flux_w.z;
@@ -30,6 +31,7 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
       flux[i] += static_cast<double>(patch.flux_w[c]);
       centre[i] += static_cast<double>(weight * patch.point.position_mm[c]);
     }
+    normal += patch.point.normal * weight;
     if (weight > brightest) {
       brightest = weight;
       node.brightest = p;
@@ -41,6 +43,10 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
   node.centre_mm = {static_cast<float>(centre[0] / weight_sum),
                     static_cast<float>(centre[1] / weight_sum),
                     static_cast<float>(centre[2] / weight_sum)};
+  const float normal_length = Length(normal);
+  node.normal = normal_length > 0
+                    ? normal / normal_length
+                    : patches[static_cast<std::size_t>(node.brightest)].point.normal;
   double variance = 0;
   for (std::int32_t p = begin; p < end; ++p) {
     const Patch& patch = patches[static_cast<std::size_t>(p)];

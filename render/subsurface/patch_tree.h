@@ -14,6 +14,7 @@ class PatchTree {
   struct Node {
     Vec3 centre_mm;          ///< weighted by flux
     float radius_mm = 0;     ///< around the centre, that its patches reach
+    Vec3 normal;             ///< unit
     Color flux_w;            ///< sum over its patches
     float variance_mm2 = 0;  ///< of the flux along one direction in the surface
     std::int32_t begin = 0;  ///< its patches
@@ -29,8 +30,8 @@ class PatchTree {
   const std::vector<Node>& nodes() const { return nodes_; }
 
   /// Visits every patch nearer to x than `reach_mm` exactly once: on its own,
-  /// on_patch(index, distance²), or as part of a node whose diameter is less than
-  /// `max_relative_extent` of its distance, on_node(index, distance²). What is farther
+  /// on_patch(index, x − centre), or as part of a node whose diameter is less than
+  /// `max_relative_extent` of its distance, on_node(index, x − centre). What is farther
   /// may be visited too.
   template <class OnNode, class OnPatch>
   void Visit(Vec3 x_mm,
@@ -50,12 +51,11 @@ class PatchTree {
         n = node.next;
       } else if (node.end - node.begin > 1 &&
                  node.radius_mm * node.radius_mm * open2 < distance2) {
-        on_node(n, distance2);
+        on_node(n, d);
         n = node.next;
       } else if (node.next == n + 1) {
         for (std::int32_t p = node.begin; p < node.end; ++p) {
-          const Vec3 e = x_mm - positions_mm_[static_cast<std::size_t>(p)];
-          on_patch(p, Dot(e, e));
+          on_patch(p, x_mm - positions_mm_[static_cast<std::size_t>(p)]);
         }
         n = node.next;
       } else {

@@ -100,15 +100,24 @@ TEST(DipoleProfile, FluxWithinIsTheIntegralOfRd) {
   EXPECT_DOUBLE_EQ(profile.FluxWithin(0), 0);
 }
 
-TEST(DipoleProfile, HalfLaplacianIsTheSecondDerivative) {
+TEST(DipoleProfile, SpreadTermsAreTheEffectOfASpreadSource) {
   const DipoleProfile profile(0.032, 0.74, PolynomialReflectance(1.3));
-  constexpr double kH = 1e-3;
-  for (const double r : {0.2, 1.0, 4.0}) {
-    const double radial =
-        (profile.Rd(r + kH) - 2 * profile.Rd(r) + profile.Rd(r - kH)) / (kH * kH);
-    const double around = (profile.Rd(r + kH) - profile.Rd(r - kH)) / (2 * kH * r);
-    EXPECT_NEAR(
-        profile.HalfLaplacian(r), 0.5 * (radial + around), 1e-4 * profile.Rd(r));
+  constexpr double kVariance = 1e-4;
+  const double step = std::sqrt(2 * kVariance);  // four points of this variance
+  for (const double in_plane : {0.0, 0.6, 2.0}) {
+    for (const double above : {0.0, 1.5}) {
+      const double r = std::hypot(in_plane, above);
+      const double spread = (profile.Rd(std::hypot(in_plane + step, above)) +
+                             profile.Rd(std::hypot(in_plane - step, above)) +
+                             2 * profile.Rd(std::hypot(in_plane, step, above))) /
+                            4;
+      const auto terms = profile.SpreadTerms(r);
+      const double expected = spread - profile.Rd(r);
+      EXPECT_NEAR(kVariance * (terms.slope + in_plane * in_plane * terms.bend),
+                  expected,
+                  2e-3 * std::abs(expected))
+          << in_plane << " " << above;
+    }
   }
 }
 

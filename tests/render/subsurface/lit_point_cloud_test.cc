@@ -117,14 +117,14 @@ TEST(PatchTree, VisitsEveryPatchOnce) {
         {5, 0, 0},
         extent,
         100,
-        [&](std::int32_t n, float) {
+        [&](std::int32_t n, Vec3) {
           ++nodes;
           const PatchTree::Node& node = tree.nodes()[static_cast<std::size_t>(n)];
           for (std::int32_t p = node.begin; p < node.end; ++p) {
             ++seen[static_cast<std::size_t>(p)];
           }
         },
-        [&](std::int32_t p, float) { ++seen[static_cast<std::size_t>(p)]; });
+        [&](std::int32_t p, Vec3) { ++seen[static_cast<std::size_t>(p)]; });
     EXPECT_TRUE(std::all_of(seen.begin(), seen.end(), [](int n) { return n == 1; }));
     EXPECT_EQ(nodes > 0, extent > 0);
   }
@@ -138,7 +138,7 @@ TEST(PatchTree, StopsAtItsReach) {
                                                  }),
                                      0.5F));
   std::size_t visited = 0;
-  const auto count = [&](std::int32_t, float) { ++visited; };
+  const auto count = [&](std::int32_t, Vec3) { ++visited; };
   tree.Visit({5, 0, 0}, 0, 1, count, count);
   EXPECT_GT(visited, 5u);
   EXPECT_LT(visited, tree.patches().size() / 10);
