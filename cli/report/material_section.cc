@@ -1,0 +1,178 @@
+#include "cli/report/html.h"
+#include "cli/report/line_plot.h"
+#include "cli/report/raster.h"
+#include "cli/report/sections.h"
+#include "factor/material.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace nacre::cli::report {
+namespace {
+
+using factor::Material;
+
+std::string ErrorOf(const Material& m, const char* key, bool percent) {
+  const auto found = m.error.find(key);
+  if (found == m.error.end()) {
+    return "–";
+  }
+  return percent ? Percent(found->second) : Number(found->second);
+}
+
+std::string Facts(const Material& m) {
+  const double stored = static_cast<double>(m.StorageBytes());
+  const double measured = 4.0 * static_cast<double>(m.PointCount() * m.WindowSize()) *
+                          static_cast<double>(m.channels.size());
+  std::vector<Fact> facts{
+      {"Method", Escape(m.method)},
+      {"Terms a channel", std::to_string(m.terms)},
+      {"Size", Bytes(stored)},
+      {"Compression", fmt::format("{} : 1", Number(measured / stored))},
+      {"Error, relative L<sup>2</sup>", ErrorOf(m, "relative_l2", true)},
+      {"RMSE over mean", ErrorOf(m, "rmse_over_mean", true)},
+      {"Log error, rms", ErrorOf(m, "log_rms", false)},
+      {"PSNR", ErrorOf(m, "psnr_db", false) + " dB"},
+      {"Worst slice", ErrorOf(m, "worst_slice", true)}};
+  if (m.cluster_count > 1) {
+    facts.push_back({"Clusters", std::to_string(m.cluster_count)});
+  }
+  return FactList(facts);
+}
+
+std::string AlbedoFigure(const Material& m) {
+  std::vector<Plane> planes;
+  float largest = 0;
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  for (const std::size_t c : PictureChannels(m.channels)) {
+    planes.push_back({m.points_x, m.points_y, {&m.albedo[c * points], points}});
+    largest = std::max(
+        largest,
+        *std::max_element(planes.back().values.begin(), planes.back().values.end()));
+  }
+  return Figure(
+      ImageTag(ColorImage(planes, largest > 0 ? 1 / static_cast<double>(largest) : 1),
+               "albedo of the material",
+               "pixels"),
+      fmt::format("The material by its albedo, white being {}.",
+                  Number(static_cast<double>(largest))),
+      "narrow");
+}
+
+std::string CurveFigures(const Material& m) {
+  if (m.error_curve.size() < 2) {
+    return "";
+  }
+  Series l2{.name = "", .color = 5, .x = {}, .y = {}, .low = {}, .high = {}};
+  Series log{.name = "", .color = 3, .x = {}, .y = {}, .low = {}, .high = {}};
+  for (const factor::TermsError& point : m.error_curve) {
+    l2.x.push_back(point.terms);
+    l2.y.push_back(100 * point.relative_l2);
+    log.x.push_back(point.terms);
+    log.y.push_back(point.log_rms);
+  }
+  return Figure(LinePlot({l2},
+                         {.x_label = "terms",
+                          .y_label = "relative L² error (%)",
+                          .log_y = true,
+                          .markers = true,
+                          .height = 220}),
+                "Error in R<sub>d</sub> against terms, on a sample of the slices.") +
+         Figure(
+             LinePlot({log},
+                      {.x_label = "terms",
+                       .y_label = "rms of ln(model / measured)",
+                       .markers = true,
+                       .y_from_zero = true,
+                       .height = 220}),
+             "Error in ln R<sub>d</sub>, above 10<sup>−5</sup> of the peak: how well "
+             "the tails are kept.");
+}
+
+// A row a channel, a column a term; every picture has a colour scale of its own.
+template <class PlaneOf>
+std::string Sheet(const Material& m, const char* letter, PlaneOf&& plane_of) {
+  const int columns = std::min(m.terms, 12);
+  std::string grid = fmt::format(
+      "<div class=\"grid\" style=\"grid-template-columns:auto "
+      "repeat({},minmax(0,1fr))\">\n<span></span>",
+      columns);
+  for (int term = 0; term < columns; ++term) {
+    grid += fmt::format("<span><i>{}</i><sub>{}</sub></span>", letter, term + 1);
+  }
+  for (std::size_t c = 0; c < m.channels.size(); ++c) {
+    grid += "\n<span class=\"side\">" + Escape(m.channels[c]) + "</span>";
+    for (int term = 0; term < columns; ++term) {
+      grid += ImageTag(DivergingImage(plane_of(static_cast<int>(c), term)),
+                       fmt::format("{}{} of {}", letter, term + 1, m.channels[c]),
+                       "pixels");
+    }
+  }
+  return grid + "</div>\n" +
+         ColorScale("− largest magnitude", "+ largest magnitude", true);
+}
+
+std::string SheetFigures(const Material& m) {
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  const std::string kernels = Sheet(m, "h", [&](int c, int term) {
+    return Plane{m.core, m.core, {m.Kernel(c, 0, term), window}};
+  });
+  const std::string maps = Sheet(m, "f", [&](int c, int term) {
+    return Plane{m.points_x, m.points_y, {m.FactorMap(c, term), points}};
+  });
+  std::string note;
+  if (m.terms > 12) {
+    note += fmt::format(" The first 12 of {} terms.", m.terms);
+  }
+  const std::string clusters =
+      m.cluster_count > 1
+          ? fmt::format(" Of the first of {} clusters.", m.cluster_count)
+          : "";
+  return Figure(kernels,
+                fmt::format(
+                    "Kernels h<sub>j</sub>(d), ±{} mm: the shapes that every slice "
+                    "is a sum of.{}{}",
+                    Number((m.core - 1) / 2 * m.pitch_mm),
+                    note,
+                    clusters)) +
+         Figure(
+             maps,
+             "Factor maps f<sub>j</sub>(x<sub>i</sub>): how much of each kernel is at "
+             "each point; mean square 1 over the sample." +
+                 note);
+}
+
+std::string TransformTable(const Material& m) {
+  if (m.transform != factor::Transform::kLog) {
+    return "<p>R<sub>d</sub> = Σ<sub>j</sub> f<sub>j</sub> h<sub>j</sub>, a channel at "
+           "a "
+           "time, each slice scaled to its measured total.</p>";
+  }
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t c = 0; c < m.channels.size(); ++c) {
+    rows.push_back({Escape(m.channels[c]), Number(m.a[c], 4), Number(m.b[c], 4)});
+  }
+  return "<p>R<sub>d</sub> = A (exp(Σ<sub>j</sub> f<sub>j</sub> h<sub>j</sub>) − B), a "
+         "channel at a time, each slice scaled to its measured total. A and B were "
+         "chosen "
+         "for the least error in R<sub>d</sub>.</p>" +
+         Table({"Channel", "A (mm<sup>−2</sup>)", "B"}, rows);
+}
+
+}  // namespace
+
+std::string MaterialSection(const std::filesystem::path& path) {
+  const Material m = factor::ReadMaterial(path);
+  const std::string curves = CurveFigures(m);
+  std::vector<std::string> top{AlbedoFigure(m)};
+  if (!curves.empty()) {
+    top.push_back("<div style=\"flex:1 1 320px;min-width:0\">" + curves + "</div>");
+  }
+  return Section("Material",
+                 path.filename().string(),
+                 Facts(m) + TransformTable(m) + Row(top) + SheetFigures(m) +
+                     ProvenanceLine(m.provenance));
+}
+
+}  // namespace nacre::cli::report

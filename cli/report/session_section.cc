@@ -1,0 +1,153 @@
+#include "cli/report/html.h"
+#include "cli/report/raster.h"
+#include "cli/report/sections.h"
+#include "core/json.h"
+#ifdef NACRE_HAS_ACQUIRE
+#include "acquire/session.h"
+#endif
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+namespace nacre::cli::report {
+namespace {
+
+// Scalars of an object, and of the objects in it with their key before, as facts.
+void AddScalars(const Json& json, const std::string& prefix, std::vector<Fact>& facts) {
+  constexpr std::size_t kMaxText = 60;
+  for (const auto& [key, value] : json.items()) {
+    std::string name = prefix + key;
+    std::replace(name.begin(), name.end(), '_', ' ');
+    if (value.is_object() && prefix.size() < 20) {
+      AddScalars(value, prefix + key + " ", facts);
+    } else if (value.is_number_float()) {
+      facts.push_back({Escape(name), Number(value.get<double>(), 4)});
+    } else if (value.is_number() || value.is_boolean()) {
+      facts.push_back({Escape(name), value.dump()});
+    } else if (value.is_string() && value.get<std::string>().size() <= kMaxText &&
+               value.get<std::string>().find('\n') == std::string::npos) {
+      facts.push_back({Escape(name), Escape(value.get<std::string>())});
+    }
+  }
+}
+
+#ifdef NACRE_HAS_ACQUIRE
+
+using acquire::Target;
+
+std::string TargetName(const acquire::SessionReader& session, std::int64_t number) {
+  const acquire::ScheduledPicture& picture = session.schedule()[number];
+  std::string name = acquire::Name(picture.target);
+  if (picture.channel >= 0) {
+    name += ", laser " +
+            session.rig().scanner.channels[static_cast<std::size_t>(picture.channel)];
+  }
+  return name;
+}
+
+// The middle one of each kind of picture that was taken: by target and laser.
+std::vector<std::int64_t> TypicalPictures(const acquire::SessionReader& session) {
+  std::vector<std::pair<std::string, std::vector<std::int64_t>>> kinds;
+  for (std::int64_t n = 0; n < session.picture_count(); ++n) {
+    const std::string name = TargetName(session, n);
+    auto kind = std::find_if(
+        kinds.begin(), kinds.end(), [&](const auto& k) { return k.first == name; });
+    if (kind == kinds.end()) {
+      kind = kinds.insert(kinds.end(), {name, {}});
+    }
+    kind->second.push_back(n);
+  }
+  std::vector<std::int64_t> typical;
+  for (const auto& [name, numbers] : kinds) {
+    // Of a bracket the longest exposure, which shows most.
+    std::int64_t best = numbers[numbers.size() / 2];
+    for (std::size_t n = numbers.size() / 2;
+         n < std::min(numbers.size(), numbers.size() / 2 + 6);
+         ++n) {
+      if (session.Entry(numbers[n]).exposure_us > session.Entry(best).exposure_us) {
+        best = numbers[n];
+      }
+    }
+    typical.push_back(best);
+  }
+  return typical;
+}
+
+std::string FrameFigure(const acquire::SessionReader& session, std::int64_t number) {
+  const acquire::Frame frame = session.ReadFrame(number);
+  const std::vector<float> counts(frame.counts.begin(), frame.counts.end());
+  const OwnedPlane small = Shrink({frame.width, frame.height, counts}, 520);
+  const auto [low, high] = std::minmax_element(counts.begin(), counts.end());
+  const auto full = static_cast<double>((1 << session.manifest().camera.bit_depth) - 1);
+  return Figure(ImageTag(ColorImage({small.View()}, 1 / full), "camera picture"),
+                fmt::format("Picture {}: {}, {} ms, {} to {} counts of {}.",
+                            number,
+                            Escape(TargetName(session, number)),
+                            Number(frame.exposure_us / 1000),
+                            Number(static_cast<double>(*low)),
+                            Number(static_cast<double>(*high), 4),
+                            full),
+                "frame");
+}
+
+std::string SessionBody(const std::filesystem::path& folder) {
+  const acquire::SessionReader session(folder);
+  const acquire::SessionManifest& m = session.manifest();
+  const std::int64_t taken = session.picture_count();
+  const std::int64_t all = session.schedule().size();
+  std::string body = FactList(
+      {{"Sample", Escape(session.rig().sample.name)},
+       {"Rig", Escape(m.rig_file + " (" + session.rig().kind + ")")},
+       {"Camera", Escape(m.camera.model)},
+       {"Sensor",
+        fmt::format(
+            "{} × {}, {} bits", m.camera.width, m.camera.height, m.camera.bit_depth)},
+       {"Illuminator", Escape(m.illuminator.model)},
+       {"Laser channels",
+        Escape(fmt::format("{}", fmt::join(m.illuminator.channels, ", ")))},
+       {"Grid",
+        fmt::format("{} × {}, {} mm",
+                    session.rig().grid.points_x,
+                    session.rig().grid.points_y,
+                    Number(session.rig().grid.pitch_mm))},
+       {"Pictures", fmt::format("{} of {}", taken, all)}});
+  body += Check(
+      session.IsComplete(),
+      session.IsComplete()
+          ? std::string("The session is complete.")
+          : fmt::format("{} pictures are still to be taken; go on with <code>nacre "
+                        "capture --resume</code>.",
+                        all - taken));
+  std::vector<std::string> frames;
+  for (const std::int64_t number : TypicalPictures(session)) {
+    frames.push_back(FrameFigure(session, number));
+  }
+  return body + Row(frames);
+}
+
+#else
+
+std::string SessionBody(const std::filesystem::path& folder) {
+  const std::filesystem::path manifest = folder / "session.json";
+  std::vector<Fact> facts;
+  AddScalars(ReadJson(manifest), "", facts);
+  return FactList(facts) +
+         Check(false, "This build can't read the pictures of a session (no acquire).");
+}
+
+#endif
+
+}  // namespace
+
+std::string SessionSection(const std::filesystem::path& folder) {
+  return Section("Capture session", folder.filename().string(), SessionBody(folder));
+}
+
+std::string JsonSection(const std::filesystem::path& path, const std::string& title) {
+  std::vector<Fact> facts;
+  AddScalars(ReadJson(path), "", facts);
+  return Section(title, path.filename().string(), FactList(facts));
+}
+
+}  // namespace nacre::cli::report
