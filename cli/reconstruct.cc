@@ -1,0 +1,61 @@
+// nacre reconstruct: a session to a dataset, R_d in mm^-2.
+
+#include "reconstruct/reconstruct.h"
+
+#include "cli/command_line.h"
+
+#include <memory>
+
+namespace nacre::cli {
+namespace {
+
+struct Arguments {
+  std::filesystem::path session;
+  std::filesystem::path calibration;
+  std::filesystem::path out;
+  std::uint64_t memory_bytes = 512'000'000;
+  reconstruct::ReconstructOptions options;
+};
+
+int Run(const Arguments& args, const Common& common) {
+  reconstruct::ReconstructOptions options = args.options;
+  options.memory_bytes = static_cast<double>(args.memory_bytes);
+  options.thread_count = common.thread_count;
+  const acquire::SessionReader session(args.session);
+  const reconstruct::ReconstructSummary summary =
+      reconstruct::Reconstruct(session,
+                               calibrate::ReadCalibration(args.calibration),
+                               args.out,
+                               options,
+                               ConsoleProgress(common));
+  Say(common, "reconstructed " + args.session.string() + ": " + summary.Brief());
+  Print(common,
+        Json{{"file", args.out.string()},
+             {"slices", summary.slice_count},
+             {"frames", summary.frame_count},
+             {"saturated_pixels", summary.saturated_count},
+             {"invalid_values", summary.invalid_count},
+             {"max_crosstalk", summary.max_crosstalk},
+             {"spot_sigma_mm", summary.spot_sigma_mm},
+             {"threads", summary.thread_count_used},
+             {"seconds", summary.seconds}},
+        args.out.string());
+  return 0;
+}
+
+}  // namespace
+
+std::function<int()> MakeReconstructVerb(CLI::App& app, const Common& common) {
+  const auto args = std::make_shared<Arguments>();
+  app.add_option("session", args->session, "folder of a complete session")->required();
+  app.add_option("--calibration", args->calibration, "calibration.json of that session")
+      ->required();
+  app.add_option("-o,--out", args->out, "dataset to write, *.rd.exr")->required();
+  app.add_option("--memory", args->memory_bytes, "for frames under way, e.g. 512MB")
+      ->transform(CLI::AsSizeValue(true))
+      ->default_str("512MB");
+  AddOptions(app, args->options);
+  return [args, &common] { return Run(*args, common); };
+}
+
+}  // namespace nacre::cli

@@ -1,0 +1,42 @@
+#pragma once
+
+#include "calibrate/calibration.h"
+#include "reconstruct/rd_dataset.h"
+
+#include <cstdint>
+#include <vector>
+
+namespace nacre::reconstruct::internal {
+
+/// The lattice of cells of pitch² that all windows of a dataset are cut from: cell
+/// (u, v) of the window of grid point (i, j) is lattice cell (i + u, j + v).
+struct CellLattice {
+  explicit CellLattice(const RdHeader& header);
+  std::int64_t Index(int column, int row) const {
+    return std::int64_t{row} * columns + column;
+  }
+  std::int64_t CellCount() const { return std::int64_t{columns} * rows; }
+  PointMm Centre(int column, int row) const;
+
+  PointMm corner_mm;  ///< upper left, of cell (0, 0)
+  double pitch_mm;
+  int columns;
+  int rows;
+};
+
+/// The piece of a pixel that lies in a cell.
+struct PixelPiece {
+  std::int64_t cell;
+  int column;
+  int row;
+  double share;  ///< of the cell's area
+  double du;     ///< its centre from the pixel's, in pixels, right and
+  double dv;     ///< down
+};
+
+/// All pieces, sorted by pixel rows. Pixels cover quadrilaterals of the sample plane.
+std::vector<std::vector<PixelPiece>> CutPixels(const CellLattice& lattice,
+                                               const calibrate::CameraGeometry& camera,
+                                               int thread_count);
+
+}  // namespace nacre::reconstruct::internal

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+namespace nacre::reconstruct::internal {
+
+/// A convex polygon of at most eight corners: a quadrilateral clipped to a rectangle.
+struct Polygon {
+  struct Corner {
+    double x = 0;
+    double y = 0;
+  };
+  std::array<Corner, 8> corners;
+  std::size_t count = 0;
+
+  void Add(Corner corner) { corners[count++] = corner; }
+  /// Shoelace formula; without sign.
+  double Area() const;
+  /// Centre of gravity; the polygon must have an area.
+  Corner Centroid() const;
+};
+
+/// What of `polygon` lies within [x0, x1] × [y0, y1] [SutherlandHodgman74].
+Polygon ClipToBox(const Polygon& polygon, double x0, double y0, double x1, double y1);
+
+}  // namespace nacre::reconstruct::internal
