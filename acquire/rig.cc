@@ -90,6 +90,7 @@ TargetsDescription ReadTargets(const TomlTable& table) {
   targets.checkerboard_poses = table.Integer("checkerboard_poses", Range{3, 200});
   targets.reference_reflectance = table.Number("reference_reflectance", Range{0.01, 1});
   targets.reference_exposure_us = table.Number("reference_exposure_us", kExposureUs);
+  targets.reference_frames = table.Integer("reference_frames", 4, Range{1, 1000});
   // A cubic in two variables has ten coefficients and needs four distinct positions
   // along each axis; the fifth makes the residual mean something.
   targets.laser_lattice = table.Integer("laser_lattice", Range{5, 99});

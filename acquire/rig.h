@@ -50,7 +50,8 @@ struct TargetsDescription {
   int checkerboard_poses = 0;        ///< pose 0 lies in the sample plane
   double reference_reflectance = 0;  ///< ρ of the diffuse standard
   double reference_exposure_us = 0;
-  int laser_lattice = 0;  ///< n: the reference is lit by n × n spots at once
+  int reference_frames = 0;  ///< pictures of the reference a channel
+  int laser_lattice = 0;     ///< n: the reference is lit by n × n spots at once
 };
 
 /// [scanner]

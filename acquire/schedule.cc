@@ -86,9 +86,12 @@ void Schedule::AddTargets(const RigDescription& rig) {
     }
   }
   for (int channel = 0; channel < rig.ChannelCount(); ++channel) {
-    pictures_.push_back({.target = Target::kReference,
-                         .channel = channel,
-                         .exposure_us = rig.targets.reference_exposure_us});
+    for (int repeat = 0; repeat < rig.targets.reference_frames; ++repeat) {
+      pictures_.push_back({.target = Target::kReference,
+                           .channel = channel,
+                           .repeat = repeat,
+                           .exposure_us = rig.targets.reference_exposure_us});
+    }
   }
 }
 

@@ -31,7 +31,7 @@ struct ScheduledPicture {
 /// All pictures of a session in the order in which they are taken; a picture's index
 /// is its number. A pure function of the rig description:
 ///   dark frames at every exposure; checkerboard poses; flat pairs; the reference
-///   target's laser lattice, one picture a channel; then, from `grid_begin` on, each
+///   target's laser lattice in each channel; then, from `grid_begin` on, each
 ///   group of grid points × channel × exposure (longest first), in that nesting.
 class Schedule {
  public:

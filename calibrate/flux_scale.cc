@@ -47,8 +47,8 @@ PixelPlane MapPixels(const CameraGeometry& camera) {
   return plane;
 }
 
-// Half the distance between neighbouring spots, less a little: the disc over which a
-// spot's light is summed.
+// The disc over which a spot's light is summed: wide enough for the skirts of any spot
+// that the lattice keeps apart, and no wider, since each pixel adds its read noise.
 double SpotReachMm(const std::vector<PointMm>& spots) {
   double closest_mm = HUGE_VAL;
   for (std::size_t a = 0; a < spots.size(); ++a) {
@@ -57,7 +57,7 @@ double SpotReachMm(const std::vector<PointMm>& spots) {
           closest_mm, std::hypot(spots[a].x - spots[b].x, spots[a].y - spots[b].y));
     }
   }
-  return 0.49 * closest_mm;
+  return 0.35 * closest_mm;
 }
 
 // Is the disc wholly in the picture?
@@ -71,6 +71,63 @@ bool InView(const CameraGeometry& camera, PointMm centre, double radius_mm) {
     }
   }
   return true;
+}
+
+// Which pixels count towards which spot.
+class SpotSums {
+ public:
+  SpotSums(const PixelPlane& plane,
+           const std::vector<PointMm>& spots,
+           double reach_mm) {
+    for (std::size_t k = 0; k < plane.centre.size(); ++k) {
+      for (std::size_t s = 0; s < spots.size(); ++s) {
+        if (std::hypot(plane.centre[k].x - spots[s].x,
+                       plane.centre[k].y - spots[s].y) <= reach_mm) {
+          members_.push_back({k, s, plane.area_mm2[k]});
+        }
+      }
+    }
+  }
+
+  // Adds Σ rate · footprint of one picture to each spot's sum.
+  void Add(const Frame& frame, double dark_counts, std::vector<double>& sums) const {
+    for (const Member& member : members_) {
+      sums[member.spot] += (frame.counts[member.pixel] - dark_counts) /
+                           frame.exposure_us * member.area_mm2;
+    }
+  }
+
+ private:
+  struct Member {
+    std::size_t pixel;
+    std::size_t spot;
+    double area_mm2;
+  };
+  std::vector<Member> members_;
+};
+
+std::vector<std::int64_t> ReferencePictures(const acquire::SessionReader& session,
+                                            int channel) {
+  std::vector<std::int64_t> numbers;
+  for (std::int64_t k = 0; k < session.schedule().grid_begin(); ++k) {
+    if (session.schedule()[k].target == acquire::Target::kReference &&
+        session.schedule()[k].channel == channel) {
+      numbers.push_back(k);
+    }
+  }
+  return numbers;
+}
+
+void RequireUnsaturated(const acquire::SessionReader& session,
+                        std::int64_t number,
+                        const Frame& frame,
+                        double saturation_counts) {
+  if (*std::max_element(frame.counts.begin(), frame.counts.end()) >=
+      saturation_counts) {
+    throw BadData(fmt::format(
+        "{}: the reference target is overexposed; lower targets.reference_exposure_us",
+        (session.folder() / session.Entry(number).file).string()));
+  }
 }
 
 }  // namespace
@@ -92,42 +149,32 @@ std::vector<ChannelResponse> EstimateFluxScales(const acquire::SessionReader& se
     throw BadData(session.folder().string() +
                   ": no spot of the laser lattice is wholly in view");
   }
+  const SpotSums sums(plane, spots, reach_mm);
+  const std::vector<std::string>& names = session.rig().scanner.channels;
   std::vector<ChannelResponse> channels;
-  for (std::int64_t number = 0; number < session.schedule().grid_begin(); ++number) {
-    const acquire::ScheduledPicture& picture = session.schedule()[number];
-    if (picture.target != acquire::Target::kReference) {
-      continue;
-    }
-    const Frame frame = session.ReadFrame(number);
-    if (*std::max_element(frame.counts.begin(), frame.counts.end()) >=
-        saturation_counts) {
-      throw BadData(
-          fmt::format("{}: the reference target is overexposed; lower "
-                      "targets.reference_exposure_us",
-                      (session.folder() / session.Entry(number).file).string()));
-    }
-    const double dark_counts = dark.Counts(frame.exposure_us);
+  for (int channel = 0; channel < std::ssize(names); ++channel) {
     std::vector<double> scales(spots.size(), 0.0);
-    for (std::size_t k = 0; k < frame.counts.size(); ++k) {
-      for (std::size_t s = 0; s < spots.size(); ++s) {
-        if (std::hypot(plane.centre[k].x - spots[s].x,
-                       plane.centre[k].y - spots[s].y) <= reach_mm) {
-          scales[s] +=
-              (frame.counts[k] - dark_counts) / frame.exposure_us * plane.area_mm2[k];
-        }
-      }
+    for (const std::int64_t number : ReferencePictures(session, channel)) {
+      const Frame frame = session.ReadFrame(number);
+      RequireUnsaturated(session, number, frame, saturation_counts);
+      sums.Add(frame, dark.Counts(frame.exposure_us), scales);
     }
     const auto n = static_cast<double>(scales.size());
     const double mean = std::accumulate(scales.begin(), scales.end(), 0.0) / n;
+    if (!(mean > 0)) {
+      throw BadData(fmt::format("{}: channel {} is dark on the reference target",
+                                session.folder().string(),
+                                names[static_cast<std::size_t>(channel)]));
+    }
     double variance = 0;
     for (const double scale : scales) {
       variance += (scale - mean) * (scale - mean) / n;
     }
+    const double frame_count = session.rig().targets.reference_frames;
     channels.push_back(
-        {.name =
-             session.rig().scanner.channels[static_cast<std::size_t>(picture.channel)],
-         .flux_scale_counts_mm2_sr_per_us =
-             mean * std::numbers::pi / session.rig().targets.reference_reflectance,
+        {.name = names[static_cast<std::size_t>(channel)],
+         .flux_scale_counts_mm2_sr_per_us = mean / frame_count * std::numbers::pi /
+                                            session.rig().targets.reference_reflectance,
          .flux_scale_spread = std::sqrt(variance) / mean});
   }
   return channels;

@@ -27,7 +27,8 @@ acquire::SessionWriter OpenSession(const CaptureRequest& request,
 }
 
 int Plan(const CaptureRequest& request, const Common& common) {
-  rigs::SimulatedRig rig(request.rig, {.thread_count = request.thread_count});
+  rigs::SimulatedRig rig(request.rig,
+                         {.seed = request.seed, .thread_count = request.thread_count});
   const acquire::CapturePlan plan =
       acquire::PlanCapture(rig.description(), rig.camera().Info());
   const std::int64_t pictures = plan.target_pictures + plan.grid_pictures;

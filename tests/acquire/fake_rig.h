@@ -42,6 +42,7 @@ checkerboard_square_mm = 2.0
 checkerboard_poses = 3
 reference_reflectance = 0.99
 reference_exposure_us = 4000
+reference_frames = 1
 laser_lattice = 5
 
 [scanner]

@@ -40,6 +40,7 @@ TEST(Rig, ReadsEveryField) {
   EXPECT_EQ(rig.targets.checkerboard_poses, 3);
   EXPECT_EQ(rig.targets.reference_reflectance, 0.99);
   EXPECT_EQ(rig.targets.reference_exposure_us, 4000);
+  EXPECT_EQ(rig.targets.reference_frames, 1);
   EXPECT_EQ(rig.targets.laser_lattice, 5);
   EXPECT_EQ(rig.scanner.mm_per_rad, 300);
   EXPECT_THAT(rig.scanner.channels, ::testing::ElementsAre("R", "G"));
@@ -49,8 +50,10 @@ TEST(Rig, ReadsEveryField) {
 }
 
 TEST(Rig, DefaultsOfScannerAndSchedule) {
-  const RigDescription rig =
-      TestRig({{"channels = [\"R\", \"G\"]\n", ""}, {"spot_spacing_cells = 4\n", ""}});
+  const RigDescription rig = TestRig({{"channels = [\"R\", \"G\"]\n", ""},
+                                      {"spot_spacing_cells = 4\n", ""},
+                                      {"reference_frames = 1\n", ""}});
+  EXPECT_EQ(rig.targets.reference_frames, 4);
   EXPECT_THAT(rig.scanner.channels, ::testing::ElementsAre("R", "G", "B"));
   EXPECT_EQ(rig.schedule.spot_spacing_cells, 5);  // ceil(1.4 * 3)
   EXPECT_EQ(rig.schedule.order_seed, 0U);
@@ -120,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadRig{"[\"R\", \"G\"]", "[\"R\", \"R\"]", "different, non-empty"},
         BadRig{"mm_per_rad = 300", "mm_per_rad = true", "expected a number"},
         BadRig{"spacing_cells = 4", "spacing_cells = 2", "would overlap"},
-        BadRig{"[schedule]", "[plan]", "rig.toml:31: plan: unknown here"},
+        BadRig{"[schedule]", "[plan]", "rig.toml:32: plan: unknown here"},
         BadRig{"kind = ", "kind ", "rig.toml:1:"}));
 
 }  // namespace
