@@ -54,7 +54,7 @@ std::vector<BeamNode> HalfRoundBeam(const Beam& beam, double feature_mm) {
 
 std::vector<BeamNode> SquareBeam(const Beam& beam, double feature_mm) {
   const internal::GaussRule rule =
-      internal::GaussLegendre(OrderFor(0.5 * beam.width_mm, feature_mm));
+      internal::GaussLegendre(OrderFor(beam.width_mm, feature_mm));
   std::vector<BeamNode> nodes;
   for (std::size_t b = 0; b < rule.node.size(); ++b) {
     for (std::size_t a = 0; a < rule.node.size(); ++a) {

@@ -73,11 +73,7 @@ Nodes ChooseRule(int column,
                  int row,
                  const CellQuadratureOptions& options,
                  std::span<const std::function<double(double)>> profiles) {
-  // In the central cell the medium may change with direction, whatever its radius says.
-  constexpr int kLeastCentralOrder = 8;
   const bool is_central = column == 0 && row == 0;
-  const int least_order = is_central ? std::max(kLeastCentralOrder, options.least_order)
-                                     : options.least_order;
   const auto make = [&](int order) {
     return is_central ? CentralRule(options.pitch_mm, order)
                       : ProductRule(column * options.pitch_mm,
@@ -88,7 +84,7 @@ Nodes ChooseRule(int column,
   Nodes chosen;
   std::vector<double> means;
   for (const int order : kOrders) {
-    if (order < least_order) {
+    if (order < options.least_order) {
       continue;
     }
     Nodes finer = make(order);

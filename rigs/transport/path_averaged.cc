@@ -4,6 +4,7 @@
 #include "rigs/internal/gauss_legendre.h"
 #include "rigs/transport/dipole.h"
 #include "rigs/transport/multipole.h"
+#include "rigs/transport/refine_cells.h"
 
 #include <algorithm>
 #include <cmath>
@@ -170,6 +171,17 @@ void PathAveraged::AddExitance(PointMm x_i,
                                double flux,
                                const PointColumns& points,
                                float* exitance) const {
+  AddChannels(x_i, channel, channel + 1, flux, points, exitance);
+}
+
+// Channels [first, last), each into its own points.count values: which media a segment
+// passes through is the same for all.
+void PathAveraged::AddChannels(PointMm x_i,
+                               std::size_t first,
+                               std::size_t last,
+                               double flux,
+                               const PointColumns& points,
+                               float* exitance) const {
   constexpr std::size_t kPiece = 512;
   float fraction[kPiece];
   for (const BeamNode& node : beam_) {
@@ -179,39 +191,70 @@ void PathAveraged::AddExitance(PointMm x_i,
                                points.y_mm + begin,
                                std::min(kPiece, points.count - begin)};
       phantom_.pattern.SecondMediumFraction(from, piece, fraction);
-      tables_[channel].Add(from, flux * node.weight, piece, fraction, exitance + begin);
+      for (std::size_t c = first; c < last; ++c) {
+        tables_[c].Add(from,
+                       flux * node.weight,
+                       piece,
+                       fraction,
+                       exitance + (c - first) * points.count + begin);
+      }
     }
   }
 }
 
 Window PathAveraged::WindowAround(PointMm x_i) const {
   Expect(quadrature_.cell_begin.size() > 1, "a phantom with a grid");
-  const std::size_t node_count = quadrature_.weight.size();
-  std::vector<float> x(node_count);
-  std::vector<float> y(node_count);
-  for (std::size_t k = 0; k < node_count; ++k) {
+  const std::size_t channels = phantom_.channels.size();
+  const std::size_t cells = quadrature_.CellCount();
+  const WindowFunction around = [&](const PointColumns& offsets, float* values) {
+    std::vector<float> x(offsets.x_mm, offsets.x_mm + offsets.count);
+    std::vector<float> y(offsets.y_mm, offsets.y_mm + offsets.count);
+    for (std::size_t k = 0; k < offsets.count; ++k) {
+      x[k] += static_cast<float>(x_i.x);
+      y[k] += static_cast<float>(x_i.y);
+    }
+    std::fill_n(values, channels * offsets.count, 0.0F);
+    AddChannels(x_i, 0, channels, 1, {x.data(), y.data(), offsets.count}, values);
+  };
+  Window window;
+  window.rd.resize(cells * channels);
+  window.sigma.resize(window.rd.size());
+  IntegrateCells(quadrature_, channels, around, window.rd);
+  if (phantom_.media.size() > 1) {
+    RefineCells({.core = phantom_.grid.core, .pitch_mm = phantom_.grid.pitch_mm},
+                CellsOfSeveralMedia(x_i),
+                channels,
+                around,
+                window.rd);
+  }
+  return window;
+}
+
+// The cells that aren't reached from x_i through one medium alone, or through mixtures
+// that are all the same: R_d bends there for other reasons than distance.
+std::vector<std::size_t> PathAveraged::CellsOfSeveralMedia(PointMm x_i) const {
+  constexpr float kSame = 1e-3F;
+  const std::size_t nodes = quadrature_.weight.size();
+  std::vector<float> x(nodes);
+  std::vector<float> y(nodes);
+  for (std::size_t k = 0; k < nodes; ++k) {
     x[k] = static_cast<float>(x_i.x) + quadrature_.dx_mm[k];
     y[k] = static_cast<float>(x_i.y) + quadrature_.dy_mm[k];
   }
-  const std::size_t cells = quadrature_.CellCount();
-  Window window;
-  window.rd.resize(cells * phantom_.channels.size());
-  window.sigma.resize(window.rd.size());
-  std::vector<float> value(node_count);
-  for (std::size_t c = 0; c < phantom_.channels.size(); ++c) {
-    std::fill(value.begin(), value.end(), 0.0F);
-    AddExitance(x_i, c, 1, {x.data(), y.data(), node_count}, value.data());
-    for (std::size_t cell = 0; cell < cells; ++cell) {
-      float sum = 0;
-      for (std::size_t k = quadrature_.cell_begin[cell];
-           k < quadrature_.cell_begin[cell + 1];
-           ++k) {
-        sum += quadrature_.weight[k] * value[k];
-      }
-      window.rd[c * cells + cell] = sum;
+  std::vector<float> fraction(nodes);
+  phantom_.pattern.SecondMediumFraction(
+      x_i, {x.data(), y.data(), nodes}, fraction.data());
+  std::vector<std::size_t> mixed;
+  for (std::size_t cell = 0; cell < quadrature_.CellCount(); ++cell) {
+    const auto begin = fraction.begin();
+    const auto [low, high] = std::minmax_element(
+        begin + static_cast<std::ptrdiff_t>(quadrature_.cell_begin[cell]),
+        begin + static_cast<std::ptrdiff_t>(quadrature_.cell_begin[cell + 1]));
+    if (*high - *low > kSame) {
+      mixed.push_back(cell);
     }
   }
-  return window;
+  return mixed;
 }
 
 double PathAveraged::Direct(PointMm x_i, PointMm x_o, std::size_t channel) const {

@@ -38,6 +38,14 @@ class PathAveraged final : public Transport {
   double Direct(PointMm x_i, PointMm x_o, std::size_t channel) const;
 
  private:
+  void AddChannels(PointMm x_i,
+                   std::size_t first,
+                   std::size_t last,
+                   double flux,
+                   const PointColumns& points,
+                   float* exitance) const;
+  std::vector<std::size_t> CellsOfSeveralMedia(PointMm x_i) const;
+
   Phantom phantom_;
   std::vector<BeamNode> beam_;       // what of the beam isn't in the tables
   std::vector<RadialTable> tables_;  // one a channel
