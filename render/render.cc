@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "render/accumulator.h"
+#include "render/exitance_field.h"
 #include "render/integrators/path.h"
 #include "render/lit_points.h"
 #include "render/stopwatch.h"
@@ -29,17 +30,17 @@ IntegratorSettings ChooseIntegrator(const Scene& scene, const std::string& name)
   return settings;
 }
 
-using Subsurfaces = std::vector<std::unique_ptr<Subsurface>>;
+using Exitances = std::vector<std::unique_ptr<ExitanceField>>;
 
 // Lets light into every translucent shape.
-Subsurfaces IlluminateShapes(const World& world,
-                             const IntegratorSettings& settings,
-                             const RenderOptions& options,
-                             const ProgressFunction& progress,
-                             RenderSummary& summary) {
+Exitances IlluminateShapes(const World& world,
+                           const IntegratorSettings& settings,
+                           const RenderOptions& options,
+                           const ProgressFunction& progress,
+                           RenderSummary& summary) {
   const auto& shapes = world.scene().shapes;
-  Subsurfaces dark(shapes.size());
-  Subsurfaces lit(shapes.size());
+  Exitances dark(shapes.size());
+  Exitances lit(shapes.size());
   const PathTracer tracer(world, dark, settings);
   const std::int64_t total =
       std::count_if(shapes.begin(), shapes.end(), [](const Shape& shape) {
@@ -67,8 +68,11 @@ Subsurfaces IlluminateShapes(const World& world,
     summary.rays += points.counters.rays;
     summary.shadow_rays += points.counters.shadow_rays;
     const Stopwatch model_time;
-    lit[i] = shapes[i].translucency->model->Illuminate(std::move(points.points),
-                                                       options.thread_count);
+    const SubsurfaceModel& model = *shapes[i].translucency->model;
+    lit[i] = std::make_unique<ExitanceField>(
+        shapes[i],
+        model.Illuminate(std::move(points.points), options.thread_count),
+        static_cast<float>(options.exitance_spacing) * model.PatchSizeMm());
     summary.models_s += model_time.Seconds();
   }
   return lit;
@@ -108,6 +112,7 @@ class Pass {
       summary.rays += tile.paths.rays;
       summary.shadow_rays += tile.paths.shadow_rays;
       summary.exitances += tile.paths.exitances;
+      summary.evaluations += tile.paths.evaluations;
       summary.bad_samples += tile.bad;
       summary.clamped_samples += tile.clamped;
     }
@@ -239,10 +244,10 @@ Rendering Render(const Scene& scene,
   const World world(scene, options.thread_count);
   summary.build_s = total.Seconds();
   DescribeScene(scene, world, summary);
-  const Subsurfaces subsurfaces =
+  const Exitances exitances =
       IlluminateShapes(world, settings, options, progress, summary);
 
-  const PathTracer tracer(world, subsurfaces, settings);
+  const PathTracer tracer(world, exitances, settings);
   Accumulator film(scene.film);
   Pass pass(scene, tracer, options, film);
   PassSchedule schedule(options, total.Seconds());

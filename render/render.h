@@ -20,6 +20,7 @@ struct RenderOptions {
   double clamp = 0;
   double points_per_patch = 4;
   double max_lit_points = 2e6;
+  double exitance_spacing = 1;
   double snapshot_s = 0;
 
   template <class Self, class Visitor>
@@ -46,6 +47,11 @@ struct RenderOptions {
           self.max_lit_points,
           Range{1, 1e9},
           "lit points a translucent object, at most");
+    visit("exitance_spacing",
+          self.exitance_spacing,
+          Range{0, 64},
+          "distance in patches of the points where a translucent surface's exitance is "
+          "evaluated, with interpolation between; 0: at every hit");
     visit("snapshot",
           self.snapshot_s,
           Range{0, 1e9},
@@ -66,7 +72,9 @@ struct RenderSummary {
   bool lit_points_capped = false;  ///< max_lit_points was too few
   std::int64_t rays = 0;
   std::int64_t shadow_rays = 0;
-  std::int64_t exitances = 0;    ///< questions to models of translucency
+  std::int64_t exitances = 0;    ///< hits of translucent surfaces
+  std::int64_t evaluations = 0;  ///< questions to their models; about, since threads
+                                 ///< may ask the same at once
   std::int64_t bad_samples = 0;  ///< NaN or infinite: left out
   std::int64_t clamped_samples = 0;
   double build_s = 0;       ///< the ray tracer's tree

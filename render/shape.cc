@@ -66,6 +66,7 @@ SurfaceHit MeshPoint(const Shape& shape, std::uint32_t triangle, Vec2 barycentri
   SurfaceHit hit;
   hit.shape = &shape;
   hit.triangle = triangle;
+  hit.barycentric = barycentric;
   hit.position = p0 + e1 * b1 + e2 * b2;
   hit.face_normal = Normalized(Cross(e1, e2));
   hit.normal = hit.face_normal;
@@ -106,6 +107,20 @@ SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point) {
   return hit;
 }
 
+void SetTangents(SurfacePoint& point, Vec3 along_u, Vec3 along_v) {
+  const Vec3 tangent = along_u - point.normal * Dot(point.normal, along_u);
+  const float length = Length(tangent);
+  if (length > 0) {
+    point.tangent_u = tangent / length;
+    const Vec3 side = Cross(point.normal, point.tangent_u);
+    point.tangent_v = Dot(side, along_v) < 0 ? -side : side;
+    return;
+  }
+  const Frame frame(point.normal);
+  point.tangent_u = frame.s;
+  point.tangent_v = frame.t;
+}
+
 SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit) {
   SurfacePoint point;
   point.position_mm = hit.position * mm_per_unit;
@@ -114,19 +129,10 @@ SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit) {
   Vec3 dpdu;
   Vec3 dpdv;
   const bool mesh = std::holds_alternative<TriangleMesh>(hit.shape->geometry);
-  const bool known =
-      mesh ? MeshTangents(hit, dpdu, dpdv) : SphereTangents(hit, dpdu, dpdv);
-  const Vec3 along = dpdu - hit.normal * Dot(hit.normal, dpdu);
-  const float length = Length(along);
-  if (known && length > 0) {
-    point.tangent_u = along / length;
-    const Vec3 side = Cross(hit.normal, point.tangent_u);
-    point.tangent_v = Dot(side, dpdv) < 0 ? -side : side;
-  } else {
-    const Frame frame(hit.normal);
-    point.tangent_u = frame.s;
-    point.tangent_v = frame.t;
+  if (!(mesh ? MeshTangents(hit, dpdu, dpdv) : SphereTangents(hit, dpdu, dpdv))) {
+    dpdu = {};
   }
+  SetTangents(point, dpdu, dpdv);
   return point;
 }
 

@@ -50,6 +50,7 @@ struct SurfaceHit {
   Vec3 face_normal;  ///< unit, outward; of the geometry
   Vec3 normal;       ///< unit, outward; interpolated, for shading
   Vec2 uv;           ///< of a mesh without: the barycentric coordinates
+  Vec2 barycentric;  ///< of corners 1 and 2, on a mesh
   float offset = 0;  ///< moves a point safely off the surface: some errors of position
 };
 
@@ -62,6 +63,10 @@ SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point);
 /// The hit as models of translucency want it: in millimetres, with tangents along u and
 /// v made orthonormal to the shading normal. Without usable uv, some frame.
 SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit);
+
+/// The tangents of a point with a normal, from sums along u and v of any length.
+/// Without usable ones, some frame.
+void SetTangents(SurfacePoint& point, Vec3 along_u, Vec3 along_v);
 
 /// Points uniform in area over a shape.
 class AreaSampler {

@@ -33,6 +33,7 @@ std::string RenderSummary::Table() const {
       "rays             {:>12}\n"
       "shadow rays      {:>12}\n"
       "exitances        {:>12}\n"
+      "evaluations      {:>12}\n"
       "bad samples      {:>12}\n"
       "clamped samples  {:>12}\n"
       "tree             {:>10.2f} s\n"
@@ -47,6 +48,7 @@ std::string RenderSummary::Table() const {
       rays,
       shadow_rays,
       exitances,
+      evaluations,
       bad_samples,
       clamped_samples,
       build_s,
@@ -69,6 +71,7 @@ Json RenderSummary::ToJson() const {
           {"rays", rays},
           {"shadow_rays", shadow_rays},
           {"exitances", exitances},
+          {"evaluations", evaluations},
           {"bad_samples", bad_samples},
           {"clamped_samples", clamped_samples},
           {"seconds",

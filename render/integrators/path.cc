@@ -24,6 +24,7 @@ PathCounters& PathCounters::operator+=(const PathCounters& other) {
   rays += other.rays;
   shadow_rays += other.shadow_rays;
   exitances += other.exitances;
+  evaluations += other.evaluations;
   return *this;
 }
 
@@ -47,9 +48,9 @@ struct PathTracer::State {
 };
 
 PathTracer::PathTracer(const World& world,
-                       const std::vector<std::unique_ptr<Subsurface>>& subsurfaces,
+                       const std::vector<std::unique_ptr<ExitanceField>>& exitances,
                        const IntegratorSettings& settings)
-    : world_(world), subsurfaces_(subsurfaces), settings_(settings) {
+    : world_(world), exitances_(exitances), settings_(settings) {
   for (const Shape& shape : world.scene().shapes) {
     const double eta = shape.translucency
                            ? static_cast<double>(shape.translucency->model->Eta())
@@ -108,10 +109,9 @@ void PathTracer::Trace(State& state) const {
       const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
       state.radiance += state.throughput * world_.Emission(hit, to_viewer) * weight;
     }
-    if (subsurfaces_[hit.shape_index] != nullptr &&
-        Dot(hit.face_normal, to_viewer) > 0) {
+    if (exitances_[hit.shape_index] != nullptr && Dot(hit.face_normal, to_viewer) > 0) {
       ++state.counters.exitances;
-      state.radiance += state.throughput * TranslucentRadiance(hit, to_viewer);
+      state.radiance += state.throughput * TranslucentRadiance(state, hit, to_viewer);
     }
     if (!deeper() || hit.shape->bsdf == nullptr) {
       return;
@@ -194,12 +194,13 @@ bool PathTracer::Continue(State& state,
 }
 
 // L_o = M F_t(η, ω_o) / (π c(η)).
-Color PathTracer::TranslucentRadiance(const SurfaceHit& hit, Vec3 to_viewer) const {
-  const Translucency& translucency = *hit.shape->translucency;
-  const SurfacePoint point = ToSurfacePoint(hit, translucency.mm_per_unit);
+Color PathTracer::TranslucentRadiance(State& state,
+                                      const SurfaceHit& hit,
+                                      Vec3 to_viewer) const {
   const float cosine = std::min(1.0F, std::abs(Dot(hit.normal, to_viewer)));
-  const float transmitted = 1 - FresnelDielectric(cosine, translucency.model->Eta());
-  return subsurfaces_[hit.shape_index]->Exitance(point) *
+  const float transmitted =
+      1 - FresnelDielectric(cosine, hit.shape->translucency->model->Eta());
+  return exitances_[hit.shape_index]->At(hit, state.counters.evaluations) *
          (transmitted * exit_scale_[hit.shape_index]);
 }
 

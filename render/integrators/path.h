@@ -1,7 +1,7 @@
 #pragma once
 
+#include "render/exitance_field.h"
 #include "render/sampler.h"
-#include "render/subsurface/subsurface.h"
 #include "render/world.h"
 
 #include <cstdint>
@@ -13,7 +13,8 @@ namespace nacre::render {
 struct PathCounters {
   std::int64_t rays = 0;
   std::int64_t shadow_rays = 0;
-  std::int64_t exitances = 0;  ///< questions to models of translucency
+  std::int64_t exitances = 0;    ///< hits of translucent surfaces
+  std::int64_t evaluations = 0;  ///< questions to models of translucency
 
   PathCounters& operator+=(const PathCounters& other);
 };
@@ -22,9 +23,9 @@ struct PathCounters {
 /// heuristic [Veach97, section 9.2.4].
 class PathTracer {
  public:
-  /// All references must outlive it. `subsurfaces`: one a shape, null where opaque.
+  /// All references must outlive it. `exitances`: one a shape, null where opaque.
   PathTracer(const World& world,
-             const std::vector<std::unique_ptr<Subsurface>>& subsurfaces,
+             const std::vector<std::unique_ptr<ExitanceField>>& exitances,
              const IntegratorSettings& settings);
 
   struct Result {
@@ -49,10 +50,10 @@ class PathTracer {
                       const Frame& frame,
                       Vec3 wo) const;
   bool Continue(State& state, const SurfaceHit& hit, const Frame& frame, Vec3 wo) const;
-  Color TranslucentRadiance(const SurfaceHit& hit, Vec3 to_viewer) const;
+  Color TranslucentRadiance(State& state, const SurfaceHit& hit, Vec3 to_viewer) const;
 
   const World& world_;
-  const std::vector<std::unique_ptr<Subsurface>>& subsurfaces_;
+  const std::vector<std::unique_ptr<ExitanceField>>& exitances_;
   IntegratorSettings settings_;
   std::vector<float> exit_scale_;  ///< 1 / (π c(η)) a shape
 };

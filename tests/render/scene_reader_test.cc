@@ -1,0 +1,464 @@
+#include "core/exr.h"
+#include "core/png.h"
+#include "factor/material.h"
+#include "render/jensen_media.h"
+#include "render/preset_path.h"
+#include "tests/render/scene_text.h"
+#include "tests/support/temp_folder.h"
+
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <fstream>
+
+namespace nacre::render::testing {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+// The body starts at this line of SceneText.
+constexpr int kBodyLine = 11;
+
+std::string BodyError(const std::string& body) {
+  return ReaderError(SceneText(body));
+}
+
+TEST(SceneReaderTest, ComposesTransformsFromTopToBottom) {
+  const Scene scene = Parse(SceneText(R"(<shape type="sphere">
+  <transform name="toWorld">
+    <translate x="1"/><rotate z="1" angle="90"/><scale value="2"/><translate z="-3"/>
+    <matrix value="1 0 0 0  0 1 0 0.5  0 0 1 0  0 0 0 1"/>
+  </transform></shape>)"));
+  const auto& sphere = std::get<Sphere>(scene.shapes[0].geometry);
+  EXPECT_NEAR(sphere.center.x, 0, 1e-6);
+  EXPECT_NEAR(sphere.center.y, 2.5, 1e-6);
+  EXPECT_NEAR(sphere.center.z, -3, 1e-6);
+  EXPECT_NEAR(sphere.radius, 2, 1e-6);
+}
+
+TEST(SceneReaderTest, ReplacesNamesByDefinesBeforeDefaults) {
+  const std::string text = SceneText(R"(<default name="r" value="3"/>
+  <default name="unit" value="1"/>
+  <shape type="sphere"><float name="radius" value="$r"/>
+  <point name="center" x="$unit" y="-$unit" z="$unit.5"/></shape>)");
+  EXPECT_EQ(std::get<Sphere>(Parse(text).shapes[0].geometry).radius, 3);
+  const Scene defined = Parse(text, {.defines = {{"r", "5"}}});
+  EXPECT_EQ(std::get<Sphere>(defined.shapes[0].geometry).radius, 5);
+  EXPECT_EQ(std::get<Sphere>(defined.shapes[0].geometry).center, (Vec3{1, -1, 1.5F}));
+  EXPECT_THAT(
+      ReaderError(SceneText("<default name=\"size\" value=\"1\"/>\n"
+                            "<shape type=\"sphere\"><float name=\"radius\" "
+                            "value=\"$sise\"/></shape>")),
+      HasSubstr("test.xml:12: $sise has no value: give -D sise=… or a <default> above; "
+                "did you mean 'size'?"));
+}
+
+TEST(SceneReaderTest, ReadsFilmSamplerAndIntegrator) {
+  const Scene scene = Parse(R"(<scene version="0.5.0">
+  <integrator type="path"><integer name="maxDepth" value="7"/>
+    <boolean name="hideEmitters" value="true"/></integrator>
+  <sensor type="perspective"><float name="fov" value="90"/>
+    <string name="fovAxis" value="y"/>
+    <sampler type="ldsampler"><integer name="sampleCount" value="33"/></sampler>
+    <film type="ldrfilm"><integer name="width" value="40"/>
+      <integer name="height" value="20"/><integer name="cropOffsetX" value="5"/>
+      <integer name="cropWidth" value="10"/><string name="pixelFormat" value="rgba"/>
+      <boolean name="banner" value="false"/>
+      <rfilter type="mitchell"><float name="B" value="0.5"/></rfilter></film>
+  </sensor></scene>)");
+  EXPECT_EQ(scene.integrator.max_depth, 7);
+  EXPECT_TRUE(scene.integrator.hide_emitters);
+  EXPECT_EQ(scene.samples_per_pixel, 33);
+  EXPECT_EQ(scene.film.crop_x, 5);
+  EXPECT_EQ(scene.film.crop_width, 10);
+  EXPECT_EQ(scene.film.crop_height, 20);
+  EXPECT_EQ(scene.film.format, PixelFormat::kRgba);
+  EXPECT_EQ(scene.film.filter, FilterKind::kMitchell);
+  EXPECT_EQ(scene.film.mitchell_b, 0.5F);
+  EXPECT_NEAR(scene.camera.half_width, 2, 1e-6);
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("Owen-scrambled")));
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("no emitter")));
+}
+
+TEST(SceneReaderTest, ReadsLights) {
+  const Scene scene = Parse(SceneText(R"(
+  <emitter type="point"><point name="position" x="1" y="2" z="3"/>
+    <rgb name="intensity" value="1, 2, 3"/></emitter>
+  <emitter type="spot"><float name="cutoffAngle" value="40"/>
+    <transform name="toWorld"><lookat origin="0,0,4" target="0,0,0"/></transform></emitter>
+  <emitter type="directional"><vector name="direction" x="0" y="-2" z="0"/>
+    <spectrum name="irradiance" value="5"/></emitter>
+  <emitter type="constant"><srgb name="radiance" value="#ff8000"/></emitter>
+  <shape type="rectangle"><emitter type="area"><rgb name="radiance" value="4"/></emitter>
+  </shape>)"));
+  ASSERT_EQ(scene.lights.size(), 4u);
+  EXPECT_EQ(std::get<PointLight>(scene.lights[0].source).intensity, (Color{1, 2, 3}));
+  const auto& spot = std::get<SpotLight>(scene.lights[1].source);
+  EXPECT_EQ(spot.direction, (Vec3{0, 0, -1}));
+  EXPECT_NEAR(spot.beam_rad, 0.75 * spot.cutoff_rad, 1e-6);
+  EXPECT_EQ(std::get<DirectionalLight>(scene.lights[2].source).direction,
+            (Vec3{0, -1, 0}));
+  const Color radiance = std::get<ConstantLight>(scene.lights[3].source).radiance;
+  EXPECT_NEAR(radiance.x, 1, 1e-6);
+  EXPECT_NEAR(radiance.y, 0.2158605F, 1e-5);  // sRGB 128 [IEC 61966-2-1]
+  EXPECT_EQ(*scene.shapes[0].radiance, (Color{4, 4, 4}));
+  EXPECT_EQ(scene.shapes[0].bsdf, nullptr);
+}
+
+TEST(SceneReaderTest, BsdfsAndTexturesAreSharedById) {
+  const Scene scene = Parse(SceneText(R"(
+  <texture type="checkerboard" id="board"><rgb name="color0" value="0.5"/></texture>
+  <bsdf type="diffuse" id="floor"><ref name="reflectance" id="board"/></bsdf>
+  <shape type="rectangle"><ref id="floor"/></shape>
+  <shape type="cube"><ref id="floor"/></shape>)"));
+  EXPECT_NE(scene.shapes[0].bsdf, nullptr);
+  EXPECT_EQ(scene.shapes[0].bsdf, scene.shapes[1].bsdf);
+  EXPECT_THAT(BodyError(R"(<shape type="cube"><ref id="flor"/></shape>)"),
+              HasSubstr("no bsdf with id 'flor' above this line; none is known here"));
+}
+
+TEST(SceneReaderTest, EveryBsdfHasItsDefaults) {
+  for (const char* type : {"diffuse",
+                           "plastic",
+                           "roughplastic",
+                           "conductor",
+                           "roughconductor",
+                           "dielectric"}) {
+    const Scene scene = Parse(SceneText(
+        std::string("<shape type=\"sphere\"><bsdf type=\"") + type + "\"/></shape>"));
+    EXPECT_NE(scene.shapes[0].bsdf, nullptr) << type;
+  }
+  EXPECT_NE(Parse(SceneText("<shape type=\"sphere\"/>")).shapes[0].bsdf, nullptr);
+}
+
+TEST(SceneReaderTest, AMirroredMeshKeepsItsOutside) {
+  const Scene scene = Parse(SceneText(R"(<shape type="cube">
+  <transform name="toWorld"><scale x="-1"/></transform></shape>
+  <shape type="rectangle"><boolean name="flipNormals" value="true"/></shape>)"));
+  const auto& cube = std::get<TriangleMesh>(scene.shapes[0].geometry);
+  for (const auto& t : cube.triangles) {
+    const Vec3 p = cube.positions[t[0]];
+    const Vec3 face = Cross(cube.positions[t[1]] - p, cube.positions[t[2]] - p);
+    EXPECT_GT(Dot(face, p), 0);
+    EXPECT_GT(Dot(cube.normals[t[0]], p), 0);
+  }
+  const auto& rectangle = std::get<TriangleMesh>(scene.shapes[1].geometry);
+  EXPECT_EQ(rectangle.normals[0], (Vec3{0, 0, -1}));
+}
+
+TEST(SceneReaderTest, ReadsTextureFilesAsLinear) {
+  const nacre::testing::TempFolder folder;
+  PngImage png{1, 2, 3, 8, {255, 0, 128, 0, 255, 0}};
+  WritePng(folder / "t.png", png);
+  ExrPart exr{"", 1, 1, {"R", "G", "B"}, {0.25F, 0.5F, 0.75F}, {}};
+  WriteExr(folder / "t.exr", {exr});
+  const auto color_at = [&](const std::string& parameters, Vec2 uv) {
+    const Scene scene =
+        ParseScene(SceneText("<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture "
+                             "name=\"reflectance\" type=\"bitmap\">" +
+                             parameters + "</texture></bsdf></shape>"),
+                   "s.xml",
+                   folder.path());
+    return scene.shapes[0].bsdf->Evaluate({0, 0, 1}, {0, 0, 1}, uv).value * 3.14159265F;
+  };
+  const std::string name = "<string name=\"filename\" value=\"t.png\"/>";
+  EXPECT_NEAR(color_at(name, {0.5F, 0.75F}).z, 0.2158605F, 1e-5);
+  EXPECT_NEAR(color_at(name, {0.5F, 0.25F}).y, 1, 1e-5);
+  EXPECT_NEAR(color_at(name + "<float name=\"gamma\" value=\"1\"/>", {0.5F, 0.75F}).z,
+              128 / 255.0,
+              1e-5);
+  EXPECT_NEAR(
+      color_at("<string name=\"filename\" value=\"t.exr\"/>", {0, 0}).y, 0.5, 1e-5);
+}
+
+TEST(SceneReaderTest, UnknownWordsAreErrorsWithTheLineAndTheNearestWord) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"<shap type=\"cube\"/>",
+       "test.xml:11: no element <shap> in a <scene>; did you "
+       "mean 'shape'?"},
+      {"\n\n<shape type=\"cubus\"/>",
+       "test.xml:13: no shape 'cubus'; did you mean 'cube'?"},
+      {"<shape type=\"sphere\">\n<float name=\"radious\" value=\"1\"/></shape>",
+       "test.xml:12: <shape type=\"sphere\"> has no parameter 'radious'; did you mean "
+       "'radius'?"},
+      {"<shape type=\"cube\"><bsdf type=\"rougplastic\"/></shape>",
+       "no bsdf 'rougplastic'; did you mean 'roughplastic'?"},
+      {"<shape type=\"cube\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" "
+       "type=\"bitmp\"/></bsdf></shape>",
+       "no texture 'bitmp'; did you mean 'bitmap'?"},
+      {"<emitter type=\"envmap\"/>", "no emitter 'envmap'; known are point, spot"},
+      {"<shape type=\"cube\"><subsurface type=\"dipol\"/></shape>",
+       "no subsurface 'dipol'; did you mean 'dipole'?"},
+      {"<shape type=\"cube\"><floatt name=\"x\" value=\"1\"/></shape>",
+       "no element <floatt>; did you mean 'float'?"},
+      {"<shape type=\"cube\"><film type=\"hdrfilm\"/></shape>",
+       "a <film> has no place in a <shape>"},
+      {"<integrator type=\"bdpt\"/>", "no integrator 'bdpt'; did you mean"},
+      {"<shape type=\"cube\"><transform name=\"toWorld\"><rotat x=\"1\"/></transform>"
+       "</shape>",
+       "no transform <rotat>; did you mean 'rotate'?"},
+      {"<shape type=\"cube\"><bsdf type=\"roughplastic\"><string name=\"distribution\" "
+       "value=\"gxx\"/></bsdf></shape>",
+       "no distribution 'gxx'; did you mean 'ggx'?"},
+      {"<shape type=\"cube\"><bsdf type=\"conductor\"><string name=\"material\" "
+       "value=\"Ax\"/></bsdf></shape>",
+       "no metal 'Ax'; did you mean 'Ag'?"},
+      {"<shape type=\"cube\"><bsdf type=\"plastic\"><string name=\"intIOR\" "
+       "value=\"watr\"/></bsdf></shape>",
+       "no substance 'watr'; did you mean 'water'?"},
+      {"<shape type=\"cube\"><subsurface type=\"dipole\"><string name=\"material\" "
+       "value=\"marbel\"/></subsurface></shape>",
+       "no medium 'marbel' in the table of Jensen et al. 2001; did you mean "
+       "'marble'?"}};
+  for (const auto& [body, message] : cases) {
+    EXPECT_THAT(BodyError(body), HasSubstr(message)) << body;
+  }
+}
+
+TEST(SceneReaderTest, WrongValuesAreErrorsAtTheirLine) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"<shape type=\"sphere\">\n<float name=\"radius\" value=\"1x\"/></shape>",
+       "test.xml:12: '1x' isn't a finite number"},
+      {"<shape type=\"sphere\"><float name=\"radius\" value=\"nan\"/></shape>",
+       "'nan' isn't a finite number"},
+      {"<shape type=\"sphere\"><float name=\"radius\" value=\"1e300\"/></shape>",
+       "'1e300' isn't a finite number"},
+      {"<shape type=\"sphere\"><float name=\"radius\" value=\"-1\"/></shape>",
+       "'radius' is -1; it must be in"},
+      {"<shape type=\"sphere\"><string name=\"radius\" value=\"1\"/></shape>",
+       "'radius' is a <string>; it must be a <float>"},
+      {"<shape type=\"sphere\"><float name=\"radius\" value=\"1\"/><float "
+       "name=\"radius\" value=\"2\"/></shape>",
+       "'radius' is given twice"},
+      {"<shape type=\"sphere\"><float name=\"radius\"/></shape>",
+       "<float> needs the attribute 'value'"},
+      {"<shape type=\"sphere\"><float value=\"1\"/></shape>", "<float> needs a name"},
+      {"<shape type=\"sphere\">radius</shape>", "text inside <shape>: 'radius'"},
+      {"<shape/>", "<shape> needs the attribute 'type'"},
+      {"<shape type=\"sphere\"><boolean name=\"flipNormals\" value=\"yes\"/></shape>",
+       "'yes' is neither true nor false"},
+      {"<shape type=\"sphere\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" "
+       "value=\"1, 2\"/></bsdf></shape>",
+       "a colour needs one or three numbers, not 2"},
+      {"<shape type=\"sphere\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" "
+       "value=\"0.1, -0.2, 0\"/></bsdf></shape>",
+       "a colour below 0"},
+      {"<shape type=\"sphere\"><bsdf type=\"diffuse\"><rgb name=\"reflectance\" "
+       "value=\"1.5\"/></bsdf></shape>",
+       "'reflectance' reaches 1.5: above 1 it would make light"},
+      {"<shape type=\"sphere\"><bsdf type=\"diffuse\"><spectrum name=\"reflectance\" "
+       "value=\"400:1 700:0\"/></bsdf></shape>",
+       "spectra by wavelength"},
+      {"<shape type=\"sphere\"><bsdf type=\"diffuse\"><srgb name=\"reflectance\" "
+       "value=\"#12345\"/></bsdf></shape>",
+       "'#12345' isn't a colour like #8040ff"},
+      {"<shape type=\"cube\"><transform name=\"toWorld\"><matrix value=\"1 2 3\"/>"
+       "</transform></shape>",
+       "a matrix needs 16 numbers, not 3"},
+      {"<shape type=\"cube\"><transform name=\"toWorld\"><scale z=\"0\"/></transform>"
+       "</shape>",
+       "the transform flattens the shape"},
+      {"<shape type=\"cube\"><transform name=\"toWorld\">\n<lookat origin=\"0,0,0\" "
+       "target=\"0,1,0\" up=\"0,1,0\"/></transform></shape>",
+       "test.xml:12: lookat: up is parallel"},
+      {"<shape type=\"sphere\"><transform name=\"toWorld\"><scale x=\"2\"/></transform>"
+       "</shape>",
+       "a sphere can only be moved, turned and scaled evenly"},
+      {"<shape type=\"obj\"/>", "a mesh needs a <string name=\"filename\">"},
+      {"<shape type=\"obj\"><string name=\"filename\" value=\"no.obj\"/></shape>",
+       "no file './no.obj'; paths start at the scene's folder"},
+      {"<emitter type=\"area\"/>", "an area light belongs inside the shape"},
+      {"<emitter type=\"spot\"><float name=\"beamWidth\" value=\"30\"/></emitter>",
+       "'beamWidth' is 30; it must be in [0, 20]"},
+      {"<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"0\" "
+       "z=\"0\"/></emitter>",
+       "a direction of length 0"},
+      {"<shape type=\"cube\"><bsdf type=\"twosided\"/></shape>",
+       "twosided needs one bsdf, not 0"},
+      {"<shape type=\"cube\"><bsdf type=\"plastic\"><float name=\"intIOR\" "
+       "value=\"0.9\"/></bsdf></shape>",
+       "higher index inside"},
+      {"<shape type=\"cube\"><subsurface type=\"dipole\"/></shape>",
+       "give one of: 'material'"},
+      {"<shape type=\"cube\"><subsurface type=\"svd\"/></shape>",
+       "svd needs a <string name=\"material\">"},
+      {"<integrator type=\"path\"><integer name=\"maxDepth\" "
+       "value=\"0\"/></integrator>",
+       "maxDepth is -1 (no limit) or at least 1"},
+      {"<integrator type=\"path\"><integer name=\"maxDepth\" "
+       "value=\"2.5\"/></integrator>",
+       "2.5 isn't a whole number"},
+      {"<sensor type=\"perspective\"/>", "a second <sensor>"}};
+  for (const auto& [body, message] : cases) {
+    EXPECT_THAT(BodyError(body), HasSubstr(message)) << body;
+  }
+}
+
+TEST(SceneReaderTest, FilmsOfImpossibleSizeAreRefused) {
+  const auto film = [](const std::string& parameters) {
+    return ReaderError(
+        "<scene><sensor type=\"perspective\"><float name=\"fov\" "
+        "value=\"40\"/><film type=\"hdrfilm\">" +
+        parameters + "</film></sensor></scene>");
+  };
+  const auto integer = [](const std::string& name, const std::string& value) {
+    return "<integer name=\"" + name + "\" value=\"" + value + "\"/>";
+  };
+  EXPECT_THAT(film(integer("width", "0")), HasSubstr("'width' is 0"));
+  EXPECT_THAT(film(integer("width", "100000")), HasSubstr("'width' is 100000"));
+  EXPECT_THAT(film(integer("width", "60000") + integer("height", "60000")),
+              HasSubstr("at most 268435456"));
+  EXPECT_THAT(film(integer("cropOffsetX", "700") + integer("cropWidth", "100")),
+              HasSubstr("isn't inside the film of 768 x 576"));
+  EXPECT_THAT(film("<string name=\"pixelFormat\" value=\"rbg\"/>"),
+              HasSubstr("no pixelFormat 'rbg'; did you mean 'rgb'?"));
+  EXPECT_THAT(film("<rfilter type=\"gauss\"/>"), HasSubstr("did you mean 'gaussian'?"));
+}
+
+TEST(SceneReaderTest, WhatIsNotASceneIsRefused) {
+  EXPECT_THAT(ReaderError("<scene>\n<shape type=\"cube\"\n</scene>"),
+              HasSubstr("not XML"));
+  EXPECT_THAT(ReaderError("<other/>"), HasSubstr("no <scene> in it"));
+  EXPECT_THAT(ReaderError("<scene/>"), HasSubstr("a scene needs a <sensor>"));
+  EXPECT_THAT(ReaderError(""), HasSubstr("test.xml:1"));
+}
+
+TEST(SceneReaderTest, EveryCutOffSceneIsRefused) {
+  const std::string whole = SceneText(
+      "<shape type=\"sphere\"><bsdf type=\"plastic\"/></shape><emitter "
+      "type=\"point\"/>");
+  for (std::size_t size = 0; size + 2 < whole.size(); size += 3) {
+    EXPECT_NE(ReaderError(whole.substr(0, size)), "no error") << size;
+  }
+}
+
+TEST(SceneReaderTest, LenientTurnsUnknownWordsIntoNotes) {
+  const Scene scene = Parse(SceneText(R"(
+  <medium type="homogeneous" id="m"/>
+  <shape type="sphere"><float name="radious" value="1"/><bsdf type="phong"/></shape>
+  <shape type="hair"/>)"),
+                            {.lenient = true});
+  EXPECT_EQ(scene.shapes.size(), 1u);
+  EXPECT_NE(scene.shapes[0].bsdf, nullptr);
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("'radious'")));
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("no bsdf 'phong'")));
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("no shape 'hair'")));
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("<medium>")));
+  // A wrong value stays an error.
+  EXPECT_THAT(ReaderError(SceneText("<shape type=\"sphere\"><float name=\"radius\" "
+                                    "value=\"x\"/></shape>"),
+                          {.lenient = true}),
+              HasSubstr("isn't a finite number"));
+}
+
+TEST(SceneReaderTest, BadTexturesAreRefused) {
+  const nacre::testing::TempFolder folder;
+  std::ofstream(folder / "t.jpg") << "x";
+  std::ofstream(folder / "t.png") << "not a picture";
+  ExrPart exr{"", 2, 1, {"R", "G", "B"}, {0, 0, 0, -1, 0, 0}, {}};
+  WriteExr(folder / "t.exr", {exr});
+  const auto error = [&](const std::string& parameters) -> std::string {
+    try {
+      ParseScene(SceneText("<shape type=\"sphere\"><bsdf type=\"diffuse\"><texture "
+                           "name=\"reflectance\" type=\"bitmap\">" +
+                           parameters + "</texture></bsdf></shape>"),
+                 "s.xml",
+                 folder.path());
+    } catch (const Error& e) {
+      return e.what();
+    }
+    return "no error";
+  };
+  const auto file = [](const std::string& name) {
+    return "<string name=\"filename\" value=\"" + name + "\"/>";
+  };
+  EXPECT_THAT(error(""), HasSubstr("a bitmap needs"));
+  EXPECT_THAT(error(file("t.jpg")), HasSubstr("neither .png nor .exr: convert it"));
+  EXPECT_THAT(error(file("t.png")), HasSubstr("t.png"));
+  EXPECT_THAT(error(file("t.exr")),
+              HasSubstr("pixel (1, 0) is negative or not finite"));
+  EXPECT_THAT(error(file("t.exr") + "<string name=\"wrapMode\" value=\"repet\"/>"),
+              HasSubstr("did you mean 'repeat'?"));
+  EXPECT_THAT(error(file("t.exr") + "<float name=\"gamma\" value=\"-2\"/>"),
+              HasSubstr("gamma must be above 0"));
+}
+
+TEST(SceneReaderTest, DipoleCoefficientsInAllThreeWays) {
+  const auto eta = [](const std::string& parameters) {
+    const Scene scene =
+        Parse(SceneText("<shape type=\"sphere\"><subsurface type=\"dipole\">" +
+                        parameters + "</subsurface></shape>"));
+    return scene.shapes[0].translucency->model->Eta();
+  };
+  EXPECT_EQ(eta("<string name=\"material\" value=\"Marble\"/>"), 1.5F);
+  EXPECT_EQ(eta("<string name=\"material\" value=\"skin1\"/>"), 1.3F);
+  EXPECT_EQ(eta("<rgb name=\"sigmaS\" value=\"2\"/><rgb name=\"sigmaA\" value=\"0.1\"/>"
+                "<float name=\"intIOR\" value=\"1.4\"/>"),
+            1.4F);
+  EXPECT_EQ(eta("<rgb name=\"sigmaT\" value=\"2\"/><rgb name=\"albedo\" value=\"0.9\"/>"
+                "<float name=\"g\" value=\"0.5\"/>"),
+            1.5F);
+}
+
+TEST(PresetTest, IsLookedForWhereTheManualSays) {
+  const nacre::testing::TempFolder folder;
+  std::filesystem::create_directories(folder / "presets");
+  std::ofstream(folder / "here.nacre.exr") << "x";
+  std::ofstream(folder / "presets/there.nacre.exr") << "x";
+  EXPECT_EQ(FindPreset("here", folder.path()), folder / "here.nacre.exr");
+  EXPECT_EQ(FindPreset("here.nacre.exr", folder.path()), folder / "here.nacre.exr");
+  setenv("NACRE_PRESET_PATH", ("/nowhere:" + (folder / "presets").string()).c_str(), 1);
+  EXPECT_EQ(FindPreset("there", folder.path()), folder / "presets/there.nacre.exr");
+  try {
+    FindPreset("missing", folder.path());
+    ADD_FAILURE() << "found what isn't there";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadData);
+    EXPECT_THAT(e.what(), HasSubstr("no material 'missing'"));
+    EXPECT_THAT(e.what(), HasSubstr(folder.path().string()));
+    EXPECT_THAT(e.what(), HasSubstr("/nowhere"));
+    EXPECT_THAT(e.what(), HasSubstr("set NACRE_PRESET_PATH"));
+  }
+  unsetenv("NACRE_PRESET_PATH");
+}
+
+// Total reflectances of the dipole with Jensen's F_dr polynomial agree with the table
+// that the paper prints beside the coefficients; ketchup and chicken's blue don't in
+// the paper itself.
+TEST(JensenMediaTest, ReproduceTheReflectancesOfThePaper) {
+  const std::map<std::string, Color> printed = {{"apple", {0.85F, 0.84F, 0.53F}},
+                                                {"chicken1", {0.31F, 0.15F, -1}},
+                                                {"chicken2", {0.32F, 0.16F, 0.10F}},
+                                                {"cream", {0.98F, 0.90F, 0.73F}},
+                                                {"marble", {0.83F, 0.79F, 0.75F}},
+                                                {"potato", {0.77F, 0.62F, 0.21F}},
+                                                {"skimmilk", {0.81F, 0.81F, 0.69F}},
+                                                {"skin1", {0.44F, 0.22F, 0.13F}},
+                                                {"skin2", {0.63F, 0.44F, 0.34F}},
+                                                {"spectralon", {1, 1, 1}},
+                                                {"wholemilk", {0.91F, 0.88F, 0.76F}}};
+  EXPECT_EQ(JensenMediumNames().size(), printed.size() + 1);
+  for (const auto& [name, reflectance] : printed) {
+    const auto medium = FindJensenMedium(name);
+    ASSERT_TRUE(medium.has_value()) << name;
+    const double eta = static_cast<double>(medium->eta);
+    const double fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+    const double a = (1 + fdr) / (1 - fdr);
+    for (int c = 0; c < 3; ++c) {
+      const double ss = static_cast<double>(medium->sigma_s_prime_per_mm[c]);
+      const double sa = static_cast<double>(medium->sigma_a_per_mm[c]);
+      const double albedo = ss / (ss + sa);
+      const double root = std::sqrt(3 * (1 - albedo));
+      const double total =
+          albedo / 2 * (1 + std::exp(-4 * a / 3 * root)) * std::exp(-root);
+      if (reflectance[c] >= 0) {
+        EXPECT_NEAR(total, static_cast<double>(reflectance[c]), 0.0085)
+            << name << ' ' << c;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace nacre::render::testing
