@@ -123,6 +123,7 @@ PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
   // square: weights 1 / variance².
   double weighted_product = 0;
   double weighted_square = 0;
+  double significance = 0;  // of the clearest pair's shot noise
   for (std::size_t k = 0; k + 1 < numbers.size(); k += 2) {
     const Frame first = session.ReadFrame(numbers[k]);
     const Pair pair = ComparePair(first, session.ReadFrame(numbers[k + 1]));
@@ -139,10 +140,14 @@ PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
     const double weight = 1 / (pair.variance_counts2 * pair.variance_counts2);
     weighted_product += weight * signal * excess;
     weighted_square += weight * signal * signal;
+    const double pixel_count = static_cast<double>(first.counts.size());
+    significance = std::max(
+        significance, excess / (pair.variance_counts2 * std::sqrt(2 / pixel_count)));
   }
-  if (!(weighted_product > 0)) {
+  constexpr double kMinSignificance = 20;  // the gain to 5 %
+  if (!(significance >= kMinSignificance && weighted_product > 0)) {
     throw BadData(
-        fmt::format("{}: the flat pictures are no noisier than the dark ones; "
+        fmt::format("{}: the flat pictures are hardly noisier than the dark ones; "
                     "was the white card lit, and are flat_exposures_us long "
                     "enough to see it?",
                     session.folder().string()));

@@ -156,9 +156,10 @@ TEST_F(CalibrateSynthetic, StopsWhenAskedTo) {
 }
 
 // What goes wrong at a rig, and what the user is told.
-std::string ErrorWith(
-    const SyntheticTruth& truth,
-    const std::vector<std::pair<std::string, std::string>>& edits = {}) {
+std::string ErrorWith(const SyntheticTruth& truth,
+                      std::vector<std::pair<std::string, std::string>> edits = {}) {
+  edits.emplace_back("checkerboard_poses = 8", "checkerboard_poses = 4");
+  edits.emplace_back("reference_frames = 2", "reference_frames = 1");
   const TempFolder folder;
   CaptureSynthetic(truth, SyntheticRigToml(edits), folder / "s");
   try {
@@ -200,7 +201,7 @@ TEST(CalibrateErrors, FlatsNotLit) {
   SyntheticTruth truth;
   truth.flat_counts_per_us = 0;
   EXPECT_THAT(ErrorWith(truth),
-              HasSubstr("flat pictures are no noisier than the dark"));
+              HasSubstr("flat pictures are hardly noisier than the dark"));
 }
 
 TEST(Radiometry, AWellThatIsFullBeforeTheConverterIsFound) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <tuple>
 
 namespace nacre::testing {
 namespace {
@@ -13,7 +14,7 @@ namespace {
 using acquire::PointMm;
 using acquire::Target;
 
-constexpr int kSubPixels = 4;  // along each axis
+constexpr int kSubPixels = 3;  // along each axis
 
 cv::Matx33d Turn(double x_rad, double y_rad, double z_rad) {
   cv::Matx33d x;
@@ -85,8 +86,13 @@ class SyntheticRig final {
 
   const SyntheticTruth& truth() const { return truth_; }
 
-  acquire::Frame Expose(std::uint64_t picture_number) const {
-    const std::vector<double> rates = Rates();
+  acquire::Frame Expose(std::uint64_t picture_number) {
+    const auto scene = std::tuple(target, pose, channel);
+    if (rates_.empty() || scene != rates_scene_) {
+      rates_ = Rates();
+      rates_scene_ = scene;
+    }
+    const std::vector<double>& rates = rates_;
     acquire::Frame frame{.width = truth_.width_px,
                          .height = truth_.height_px,
                          .counts = std::vector<std::uint16_t>(rates.size()),
@@ -203,6 +209,8 @@ class SyntheticRig final {
   SyntheticTruth truth_;
   acquire::RigDescription rig_;
   std::vector<cv::Point2d> rays_;
+  std::vector<double> rates_;  // of the scene below
+  std::tuple<Target, int, int> rates_scene_;
 };
 
 class SyntheticCamera final : public acquire::Camera {
