@@ -55,15 +55,14 @@ MaterialWindows::MaterialWindows(std::shared_ptr<const factor::Material> materia
       rows_(2 * material_->points_y - 1),
       radius_(static_cast<float>(material_->core / 2 + 1)),
       kept_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {
-  const double side = material_->core + 2;
-  const double window_bytes = static_cast<double>(sizeof(Window)) +
-                              static_cast<double>(sizeof(ColorLanes)) * side * side;
+  const std::size_t lanes = CellCount() + WindowCentre::Nodes().size();
+  const double window_bytes = static_cast<double>(sizeof(ColorLanes) * lanes);
   kept_most_ = static_cast<std::int64_t>(cache_mb * 1e6 / window_bytes);
 }
 
 MaterialWindows::~MaterialWindows() {
   for (const auto& window : kept_) {
-    delete window.load();
+    delete[] window.load();
   }
 }
 
@@ -99,12 +98,11 @@ ColorLanes MaterialWindows::Cell(const Points& points, int u, int v) const {
   return sum * (1 / static_cast<float>(points.count));
 }
 
-std::unique_ptr<MaterialWindows::Window> MaterialWindows::Evaluate(
-    const Points& points) const {
+std::unique_ptr<ColorLanes[]> MaterialWindows::Evaluate(const Points& points) const {
   const int core = material_->core;
   const auto side = static_cast<std::size_t>(core + 2);
-  auto window = std::make_unique<Window>();
-  window->cells.resize(side * side);
+  constexpr std::size_t kNodes = WindowCentre::Nodes().size();
+  auto window = std::make_unique<ColorLanes[]>(CellCount() + kNodes);
   std::vector<float> values(static_cast<std::size_t>(core * core));
   for (std::size_t p = 0; p < points.count; ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
@@ -117,13 +115,13 @@ std::unique_ptr<MaterialWindows::Window> MaterialWindows::Evaluate(
       std::size_t n = 0;
       for (std::size_t v = 1; v + 1 < side; ++v) {
         for (std::size_t u = 1; u + 1 < side; ++u) {
-          window->cells[v * side + u].v[c] += values[n++];
+          window[v * side + u].v[c] += values[n++];
         }
       }
     }
   }
-  for (ColorLanes& cell : window->cells) {
-    cell = cell * (1 / static_cast<float>(points.count));
+  for (std::size_t n = 0; n < CellCount(); ++n) {
+    window[n] = window[n] * (1 / static_cast<float>(points.count));
   }
   WindowCentre::Cells middle;
   for (int n = 0; n < 25; ++n) {
@@ -131,22 +129,22 @@ std::unique_ptr<MaterialWindows::Window> MaterialWindows::Evaluate(
     const int v = core / 2 + n / 5 - 1;
     if (u >= 0 && v >= 0 && u < core + 2 && v < core + 2) {
       middle[static_cast<std::size_t>(n)] =
-          window
-              ->cells[static_cast<std::size_t>(v) * side + static_cast<std::size_t>(u)];
+          window[static_cast<std::size_t>(v) * side + static_cast<std::size_t>(u)];
     }
   }
-  window->centre = WindowCentre(middle);
+  const WindowCentre centre(middle);
+  std::copy(centre.nodes().begin(), centre.nodes().end(), &window[CellCount()]);
   return window;
 }
 
-const MaterialWindows::Window* MaterialWindows::Find(int window) const {
+const ColorLanes* MaterialWindows::Find(int window) const {
   auto& slot = kept_[static_cast<std::size_t>(window)];
-  const Window* found = slot.load(std::memory_order_acquire);
+  const ColorLanes* found = slot.load(std::memory_order_acquire);
   if (found != nullptr ||
       evaluated_count_.load(std::memory_order_relaxed) >= kept_most_) {
     return found;
   }
-  std::unique_ptr<const Window> made = Evaluate(PointsOf(window));
+  std::unique_ptr<const ColorLanes[]> made = Evaluate(PointsOf(window));
   // Two threads may have evaluated the same window, to the same values; the first
   // stays.
   if (slot.compare_exchange_strong(found, made.get(), std::memory_order_acq_rel)) {
@@ -160,10 +158,10 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
   if (!(std::abs(column) < radius_ && std::abs(row) < radius_)) {
     return {};
   }
-  const Window* kept = Find(window);
+  const ColorLanes* kept = Find(window);
   if (WindowCentre::Covers(column, row)) {
     if (kept != nullptr) {
-      return kept->centre.At(column, row);
+      return WindowCentre::At(kept + CellCount(), column, row);
     }
     const Points points = PointsOf(window);
     WindowCentre::Cells middle;
@@ -171,7 +169,7 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
       middle[static_cast<std::size_t>(n)] = Cell(
           points, material_->core / 2 + n % 5 - 2, material_->core / 2 + n / 5 - 2);
     }
-    return WindowCentre(middle).At(column, row);
+    return WindowCentre::At(WindowCentre(middle).nodes().data(), column, row);
   }
   const float x = column + radius_;
   const float y = row + radius_;
@@ -182,7 +180,7 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
   if (kept != nullptr) {
     const auto side = static_cast<std::size_t>(material_->core + 2);
     const ColorLanes* cell =
-        &kept->cells[static_cast<std::size_t>(v) * side + static_cast<std::size_t>(u)];
+        kept + static_cast<std::size_t>(v) * side + static_cast<std::size_t>(u);
     return Mix(
         Mix(cell[0], cell[1], across), Mix(cell[side], cell[side + 1], across), down);
   }
@@ -190,6 +188,22 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
   return Mix(Mix(Cell(points, u - 1, v - 1), Cell(points, u, v - 1), across),
              Mix(Cell(points, u - 1, v), Cell(points, u, v), across),
              down);
+}
+
+void MaterialWindows::Prefetch(int window, float column, float row) const {
+  const ColorLanes* kept =
+      kept_[static_cast<std::size_t>(window)].load(std::memory_order_acquire);
+  if (kept == nullptr || !(std::abs(column) < radius_ && std::abs(row) < radius_) ||
+      WindowCentre::Covers(column, row)) {
+    return;  // centres are small, and read by patches that are near each other
+  }
+  const int side = material_->core + 2;
+  const ColorLanes* cell = kept + static_cast<int>(row + radius_) * side +
+                           static_cast<int>(column + radius_);
+  __builtin_prefetch(cell);
+  __builtin_prefetch(cell + 1);
+  __builtin_prefetch(cell + side);
+  __builtin_prefetch(cell + side + 1);
 }
 
 Color MaterialWindows::Albedo(int window) const {

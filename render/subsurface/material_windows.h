@@ -35,6 +35,9 @@ class MaterialWindows {
   /// downwards.
   ColorLanes At(int window, float column, float row) const;
 
+  /// Gets what At will read on its way from memory.
+  void Prefetch(int window, float column, float row) const;
+
   /// Σ_d R_d · pitch² of a window, by the material's own albedo map.
   Color Albedo(int window) const;
 
@@ -44,10 +47,6 @@ class MaterialWindows {
   std::int64_t evaluated_count() const { return evaluated_count_.load(); }
 
  private:
-  struct Window {
-    WindowCentre centre;
-    std::vector<ColorLanes> cells;  ///< (core + 2)², with a border of zeros
-  };
   /// The one, two or four grid points that a window is the mean of.
   struct Points {
     std::array<std::array<int, 2>, 4> ij;
@@ -56,8 +55,12 @@ class MaterialWindows {
 
   Points PointsOf(int window) const;
   ColorLanes Cell(const Points& points, int u, int v) const;
-  std::unique_ptr<Window> Evaluate(const Points& points) const;
-  const Window* Find(int window) const;
+  std::unique_ptr<ColorLanes[]> Evaluate(const Points& points) const;
+  const ColorLanes* Find(int window) const;
+  std::size_t CellCount() const {
+    const auto side = static_cast<std::size_t>(material_->core + 2);
+    return side * side;
+  }
 
   std::shared_ptr<const factor::Material> material_;
   std::array<int, 3> channel_of_colour_{};
@@ -66,7 +69,9 @@ class MaterialWindows {
   float radius_ = 0;
   std::int64_t kept_most_ = 0;
   mutable std::atomic<std::int64_t> evaluated_count_ = 0;
-  mutable std::vector<std::atomic<const Window*>> kept_;
+  /// Of each window kept: (core + 2)² cells with a border of zeros, then the nodes of
+  /// its WindowCentre.
+  mutable std::vector<std::atomic<const ColorLanes*>> kept_;
 };
 
 }  // namespace nacre::render

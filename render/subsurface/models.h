@@ -44,7 +44,7 @@ std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parame
 struct FactoredOptions {
   double patches_per_pitch = 2;  ///< patch side = pitch / this
   /// As for the dipole; clusters are used from a few pitches on.
-  double max_relative_extent = 0.5;
+  double max_relative_extent = 0.6;
   double window_cache_mb = 256;  ///< for evaluated windows, at most
 
   template <class Self, class Visitor>

@@ -54,13 +54,20 @@ class PatchTree {
         on_node(n, d);
         n = node.next;
       } else if (node.next == n + 1) {
-        for (std::int32_t p = node.begin; p < node.end; ++p) {
-          on_patch(p, x_mm - positions_mm_[static_cast<std::size_t>(p)]);
-        }
+        VisitPatches(n, x_mm, on_patch);
         n = node.next;
       } else {
         ++n;
       }
+    }
+  }
+
+  /// Calls on_patch(index, x − centre) for the patches of one node.
+  template <class OnPatch>
+  void VisitPatches(std::int32_t n, Vec3 x_mm, OnPatch&& on_patch) const {
+    const Node& node = nodes_[static_cast<std::size_t>(n)];
+    for (std::int32_t p = node.begin; p < node.end; ++p) {
+      on_patch(p, x_mm - positions_mm_[static_cast<std::size_t>(p)]);
     }
   }
 

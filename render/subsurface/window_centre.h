@@ -29,14 +29,18 @@ class WindowCentre {
            row < kHalfWidth;
   }
 
+  static constexpr int kNodes = 7;
+  using Nodes = std::array<ColorLanes, kNodes * kNodes>;
+  const Nodes& nodes() const { return nodes_; }
+
   /// R_d at an offset in pitches, columns to the right and rows downwards, that is
-  /// covered.
-  ColorLanes At(float column, float row) const {
+  /// covered; from nodes() wherever they are kept.
+  static ColorLanes At(const ColorLanes* nodes, float column, float row) {
     const float x = (column + kHalfWidth) * 2;
     const float y = (row + kHalfWidth) * 2;
     const int i = static_cast<int>(x);
     const int j = static_cast<int>(y);
-    const ColorLanes* node = &nodes_[static_cast<std::size_t>(j * kNodes + i)];
+    const ColorLanes* node = nodes + (j * kNodes + i);
     const float across = x - static_cast<float>(i);
     return Mix(Mix(node[0], node[1], across),
                Mix(node[kNodes], node[kNodes + 1], across),
@@ -45,8 +49,7 @@ class WindowCentre {
 
  private:
   static constexpr float kHalfWidth = 1.5F;
-  static constexpr int kNodes = 7;
-  std::array<ColorLanes, kNodes * kNodes> nodes_{};
+  Nodes nodes_{};
 };
 
 }  // namespace nacre::render
