@@ -18,7 +18,7 @@ struct SlabBoundary {
 /// Donner and Jensen's multipole for a slab [Donner05, sec. 3], per unit flux that
 /// entered at normal incidence: the images of the source in both faces. Near the beam
 /// the images are summed; from about one thickness on, where they cancel, the same
-/// Green's function is summed over the slab's modes instead [Haberman, ch. 9], whose
+/// Green's function is summed over the slab's modes instead [Carslaw59, ch. 14], whose
 /// terms fall as exp(−nπr/H). A perfectly reflecting bottom is the middle of a slab
 /// twice as thick with a mirrored source.
 class Multipole {
