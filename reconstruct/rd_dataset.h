@@ -1,7 +1,5 @@
 #pragma once
 
-#include "core/provenance.h"
-
 #include <cstdint>
 #include <filesystem>
 #include <memory>

@@ -1,9 +1,11 @@
 #include "reconstruct/reconstruct.h"
 
+#include "core/options_json.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
+#include "reconstruct/internal/crosstalk.h"
 #include "reconstruct/internal/group_slices.h"
 #include "reconstruct/internal/slice_spool.h"
 #include "reconstruct/internal/spot_width.h"
@@ -12,10 +14,12 @@
 #include <algorithm>
 #include <chrono>
 #include <fmt/format.h>
+#include <optional>
 
 namespace nacre::reconstruct {
 namespace {
 
+using internal::Crosstalk;
 using internal::GroupReader;
 using internal::GroupSlices;
 using internal::SliceSpool;
@@ -81,6 +85,90 @@ RdHeader HeaderOf(const acquire::SessionReader& session,
   return header;
 }
 
+// As many groups side by side as the memory is for, and no more than threads.
+int GroupsAtOnce(const GroupReader& reader, const ReconstructOptions& options) {
+  const double left = options.memory_bytes - static_cast<double>(reader.SharedBytes());
+  const double affordable = left / static_cast<double>(reader.WorkingBytes());
+  return static_cast<int>(
+      std::clamp<double>(affordable, 1, ThreadCount(options.thread_count)));
+}
+
+std::filesystem::path AbsoluteFolder(const std::filesystem::path& path) {
+  return std::filesystem::absolute(path).parent_path();
+}
+
+// Pass 1: pictures to slices, as measured, parked in `spool`.
+void Measure(const acquire::SessionReader& session,
+             const calibrate::Calibration& calibration,
+             const ReconstructOptions& options,
+             const RdHeader& header,
+             SliceSpool& spool,
+             ReconstructSummary& summary,
+             const ProgressFunction& progress) {
+  const GroupReader reader(
+      session, calibration, header, summary.spot_sigma_mm, options.thread_count);
+  const int groups = session.schedule().group_count();
+  const int at_once = GroupsAtOnce(reader, options);
+  summary.thread_count_used = at_once;
+  for (int first = 0; first < groups; first += at_once) {
+    Report(progress, {"reconstruct", first, groups, "pictures"});
+    const int count = std::min(at_once, groups - first);
+    std::vector<GroupSlices> results(static_cast<std::size_t>(count));
+    ParallelFor(count, at_once, [&](std::int64_t k) {
+      results[static_cast<std::size_t>(k)] = reader.Read(first + static_cast<int>(k));
+    });
+    for (int k = 0; k < count; ++k) {
+      const GroupSlices& result = results[static_cast<std::size_t>(k)];
+      const auto spots = session.schedule().Group(first + k);
+      for (std::size_t n = 0; n < spots.size(); ++n) {
+        spool.Park(std::int64_t{spots[n].j} * header.points_x + spots[n].i,
+                   result.slices[n]);
+      }
+      summary.frame_count += result.frame_count;
+      summary.saturated_count += result.saturated_count;
+      summary.invalid_count += result.invalid_count;
+      summary.slice_count += std::ssize(spots);
+    }
+  }
+  Report(progress, {"reconstruct", groups, groups, "pictures"});
+}
+
+// Pass 2: slices, freed of each other's light, in the order of the file.
+void WriteSlices(const acquire::SessionReader& session,
+                 const ReconstructOptions& options,
+                 const RdHeader& header,
+                 const SliceSpool& spool,
+                 RdWriter& writer,
+                 ReconstructSummary& summary,
+                 const ProgressFunction& progress) {
+  std::optional<Crosstalk> crosstalk;
+  if (options.subtract_crosstalk) {
+    Report(progress, {"crosstalk", 0, header.points_y, "tails"});
+    crosstalk.emplace(header, session.schedule(), spool, options.thread_count);
+  }
+  const auto width = static_cast<std::size_t>(header.points_x);
+  for (int j = 0; j < header.points_y; ++j) {
+    Report(progress, {"crosstalk", j, header.points_y, "slices"});
+    constexpr std::size_t kSlicesAtOnce = 64;
+    for (std::size_t first = 0; first < width; first += kSlicesAtOnce) {
+      const std::size_t count = std::min(kSlicesAtOnce, width - first);
+      std::vector<RdSlice> slices(count);
+      std::vector<double> shares(count, 0.0);
+      ParallelFor(std::ssize(slices), options.thread_count, [&](std::int64_t n) {
+        const auto k = static_cast<std::size_t>(n);
+        const std::int64_t s =
+            std::int64_t{j} * header.points_x + static_cast<std::int64_t>(first + k);
+        slices[k] = crosstalk ? crosstalk->Clean(s, &shares[k]) : spool.Fetch(s);
+      });
+      for (std::size_t k = 0; k < count; ++k) {
+        writer.WriteSlice(static_cast<int>(first + k), j, slices[k]);
+        summary.max_crosstalk = std::max(summary.max_crosstalk, shares[k]);
+      }
+    }
+  }
+  Report(progress, {"crosstalk", header.points_y, header.points_y, "slices"});
+}
+
 }  // namespace
 
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
@@ -95,33 +183,11 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   ReconstructSummary summary;
   summary.spot_sigma_mm =
       options.sharpen_spot ? internal::MeasureSpotSigmaMm(session, calibration) : 0;
-  const GroupReader reader(
-      session, calibration, header, summary.spot_sigma_mm, options.thread_count);
   RdWriter writer(out, header);
-  const int groups = session.schedule().group_count();
-  const int threads = ThreadCount(options.thread_count);
-  for (int first = 0; first < groups; first += threads) {
-    Report(progress, {"reconstruct", first, groups, ""});
-    const int count = std::min(threads, groups - first);
-    std::vector<GroupSlices> results(static_cast<std::size_t>(count));
-    ParallelFor(count, threads, [&](std::int64_t k) {
-      results[static_cast<std::size_t>(k)] = reader.Read(first + static_cast<int>(k));
-    });
-    for (int k = 0; k < count; ++k) {
-      const GroupSlices& result = results[static_cast<std::size_t>(k)];
-      const auto spots = session.schedule().Group(first + k);
-      for (std::size_t n = 0; n < spots.size(); ++n) {
-        writer.WriteSlice(spots[n].i, spots[n].j, result.slices[n]);
-      }
-      summary.frame_count += result.frame_count;
-      summary.saturated_count += result.saturated_count;
-      summary.invalid_count += result.invalid_count;
-      summary.slice_count += std::ssize(spots);
-    }
-  }
+  SliceSpool spool(AbsoluteFolder(out), header);
+  Measure(session, calibration, options, header, spool, summary, progress);
+  WriteSlices(session, options, header, spool, writer, summary, progress);
   writer.Finish();
-  Report(progress, {"reconstruct", groups, groups, ""});
-  summary.thread_count_used = threads;
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;

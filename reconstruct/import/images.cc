@@ -1,5 +1,6 @@
 #include "reconstruct/import/images.h"
 
+#include "core/options_json.h"
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/hash.h"

@@ -1,5 +1,6 @@
 #include "reconstruct/import/psf.h"
 
+#include "core/options_json.h"
 #include "core/error.h"
 #include "core/provenance.h"
 #include "reconstruct/internal/little_endian.h"
