@@ -1,5 +1,6 @@
 #include "factor/factor.h"
 
+#include "core/options_json.h"
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/provenance.h"

@@ -20,7 +20,7 @@ struct FactorOptions {
   double bytes = 0;
   double error = 0;
   double log_weight = 0;
-  int sample_rows = 512;
+  int sample_rows = 256;
   int fill_rounds = 2;
 
   int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result

@@ -50,17 +50,17 @@ std::string Marks(const DatasetDigest& d) {
     const double y = d.samples[n].j + 0.5;
     const bool left = x > 0.85 * d.header.points_x;
     svg += fmt::format(
-        "<circle cx=\"{0}\" cy=\"{1}\" r=\"{2}\" fill=\"none\" stroke=\"#fff\" "
-        "stroke-width=\"{3}\"/><text x=\"{4}\" y=\"{5}\" font-size=\"{6}\" "
-        "text-anchor=\"{7}\" style=\"fill:#fff;paint-order:stroke;stroke:#0008;"
-        "stroke-width:{3}\">{8}</text>",
+        "<g style=\"paint-order:stroke;stroke-linejoin:round\" stroke=\"#222\" "
+        "stroke-width=\"{3}\" fill=\"#fff\"><circle cx=\"{0}\" cy=\"{1}\" r=\"{2}\"/>"
+        "<text x=\"{4}\" y=\"{5}\" font-size=\"{6}\" font-weight=\"600\" "
+        "text-anchor=\"{7}\" style=\"fill:#fff\">{8}</text></g>",
         x,
         y,
-        1.6 * unit,
-        0.6 * unit,
-        x + (left ? -3 : 3) * unit,
-        y + 1.9 * unit,
-        5.4 * unit,
+        1.1 * unit,
+        0.9 * unit,
+        x + (left ? -2.6 : 2.6) * unit,
+        y + 2 * unit,
+        5.8 * unit,
         left ? "end" : "start",
         n + 1);
   }
@@ -99,9 +99,11 @@ std::string ProfileFigure(const DatasetDigest& d) {
                       p.high});
   }
   return Figure(
-      LinePlot(
-          series,
-          {.x_label = "distance |d| (mm)", .y_label = "R_d (mm⁻²)", .log_y = true}),
+      LinePlot(series,
+               {.x_label = "distance |d| (mm)",
+                .y_label = "R<tspan dy=\"3\" font-size=\"9\">d</tspan><tspan "
+                           "dy=\"-3\"> (mm⁻²)</tspan>",
+                .log_y = true}),
       "Radial profile: mean over all slices, with the band that holds 80 % of "
       "them.");
 }
@@ -207,7 +209,7 @@ std::string ReciprocityCheck(const DatasetDigest& d) {
                     : "."));
 }
 
-std::string MapFigures(const DatasetDigest& d) {
+std::string MapFigures(const DatasetDigest& d, const std::string& beside) {
   std::vector<std::string> figures;
   if (d.pair_count > 0) {
     const float high =
@@ -234,7 +236,21 @@ std::string MapFigures(const DatasetDigest& d) {
         "picture or the lit field.",
         "narrow"));
   }
-  return figures.empty() ? "" : Row(figures);
+  figures.push_back("<div class=\"grow\">" + beside + "</div>");
+  return Row(figures);
+}
+
+// By the verb that made it.
+std::string TitleOf(const RdHeader& header) {
+  const std::string symbol = "R<sub>d</sub>(x<sub>i</sub>, x<sub>o</sub>)";
+  const auto made_by = [&](const char* verb) {
+    return header.provenance.find(fmt::format("\"command\":\"{}\"", verb)) !=
+           std::string::npos;
+  };
+  return made_by("simulate")      ? "Simulated truth, " + symbol
+         : made_by("reconstruct") ? "Reconstructed " + symbol
+         : made_by("import")      ? "Imported " + symbol
+                                  : "Dataset " + symbol;
 }
 
 }  // namespace
@@ -247,19 +263,20 @@ std::string DatasetSection(const std::filesystem::path& path,
   std::string body =
       Facts(d) + Row({AlbedoFigure(d), ProfileFigure(d)}) + SliceFigure(d);
   if (brief) {
-    return Section("Dataset R_d(x_i, x_o)",
+    return Section(TitleOf(d.header),
                    path.filename().string(),
                    body + ProvenanceLine(d.header.provenance));
   }
-  body += "<h3>Energy and reciprocity</h3>\n" + EnergyTable(d) + ReciprocityCheck(d);
-  body +=
+  const std::string checks =
+      EnergyTable(d) + ReciprocityCheck(d) +
       Check(d.missing < 0.5,
             d.missing == 0
                 ? std::string("Every cell of every window was measured.")
                 : fmt::format("{} of all cells were not measured and are marked so.",
                               Percent(d.missing)));
-  body += MapFigures(d) + ProvenanceLine(d.header.provenance);
-  return Section("Dataset R_d(x_i, x_o)", path.filename().string(), body);
+  body += "<h3>Energy and reciprocity</h3>\n" + MapFigures(d, checks) +
+          ProvenanceLine(d.header.provenance);
+  return Section(TitleOf(d.header), path.filename().string(), body);
 }
 
 }  // namespace nacre::cli::report

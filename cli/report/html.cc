@@ -32,6 +32,16 @@ std::string Escape(std::string_view text) {
   return out;
 }
 
+std::string Prose(std::string_view text) {
+  constexpr std::string_view kSymbol = "R_d";
+  std::string out = Escape(text);
+  for (auto at = out.find(kSymbol); at != std::string::npos;
+       at = out.find(kSymbol, at)) {
+    out.replace(at, kSymbol.size(), "R<sub>d</sub>");
+  }
+  return out;
+}
+
 std::string Base64(std::string_view bytes) {
   constexpr char kDigits[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -127,7 +137,7 @@ std::string Section(const std::string& title,
                     const std::string& origin,
                     const std::string& body) {
   return fmt::format("<section>\n<header><h2>{}</h2>{}</header>\n{}</section>\n",
-                     Escape(title),
+                     title,
                      origin.empty() ? "" : "<code>" + Escape(origin) + "</code>",
                      body);
 }

@@ -12,6 +12,9 @@ namespace nacre::cli::report {
 /// Text as HTML: &, <, > and quotes escaped.
 std::string Escape(std::string_view text);
 
+/// As Escape, with R_d as it is printed.
+std::string Prose(std::string_view text);
+
 /// RFC 4648.
 std::string Base64(std::string_view bytes);
 
@@ -47,6 +50,7 @@ std::string Table(const std::vector<std::string>& head,
 /// What a check found: a sign, not by colour alone, and a sentence (HTML).
 std::string Check(bool good, const std::string& sentence);
 
+/// `title` is HTML, `origin` plain text.
 std::string Section(const std::string& title,
                     const std::string& origin,
                     const std::string& body);

@@ -162,8 +162,8 @@ std::string AxesSvg(const Axis& x, const Axis& y, const PlotOptions& options) {
       "<text x=\"4\" y=\"14\">{}</text>\n",
       x.end,
       y.begin + 38,
-      Escape(options.x_label),
-      Escape(options.y_label));
+      options.x_label,
+      options.y_label);
   return svg;
 }
 

@@ -17,13 +17,13 @@ struct Series {
 };
 
 struct PlotOptions {
-  std::string x_label;
+  std::string x_label;  ///< SVG text markup
   std::string y_label;
   bool log_y = false;
   bool markers = false;      ///< dots at the points, for few of them
   bool y_from_zero = false;  ///< on a linear axis
-  int width = 460;
-  int height = 290;
+  int width = 560;
+  int height = 330;
 };
 
 /// An inline SVG with axes, round ticks and a legend, in the page's colours.

@@ -71,22 +71,24 @@ std::string CurveFigures(const Material& m) {
     log.x.push_back(point.terms);
     log.y.push_back(point.log_rms);
   }
-  return Figure(LinePlot({l2},
-                         {.x_label = "terms",
-                          .y_label = "relative L² error (%)",
-                          .log_y = true,
-                          .markers = true,
-                          .height = 220}),
-                "Error in R<sub>d</sub> against terms, on a sample of the slices.") +
-         Figure(
-             LinePlot({log},
-                      {.x_label = "terms",
-                       .y_label = "rms of ln(model / measured)",
-                       .markers = true,
-                       .y_from_zero = true,
-                       .height = 220}),
-             "Error in ln R<sub>d</sub>, above 10<sup>−5</sup> of the peak: how well "
-             "the tails are kept.");
+  return Row(
+      {Figure(LinePlot({l2},
+                       {.x_label = "terms",
+                        .y_label = "relative L² error (%)",
+                        .log_y = true,
+                        .markers = true,
+                        .width = 460,
+                        .height = 260}),
+              "Error in R<sub>d</sub> against terms, on a sample of the slices."),
+       Figure(LinePlot({log},
+                       {.x_label = "terms",
+                        .y_label = "rms of ln(model / measured)",
+                        .markers = true,
+                        .y_from_zero = true,
+                        .width = 460,
+                        .height = 260}),
+              "Error in ln R<sub>d</sub>, above 10<sup>−5</sup> of the peak: how well "
+              "the tails are kept.")});
 }
 
 // A row a channel, a column a term; every picture has a colour scale of its own.
@@ -164,15 +166,12 @@ std::string TransformTable(const Material& m) {
 
 std::string MaterialSection(const std::filesystem::path& path) {
   const Material m = factor::ReadMaterial(path);
-  const std::string curves = CurveFigures(m);
-  std::vector<std::string> top{AlbedoFigure(m)};
-  if (!curves.empty()) {
-    top.push_back("<div style=\"flex:1 1 320px;min-width:0\">" + curves + "</div>");
-  }
   return Section("Material",
                  path.filename().string(),
-                 Facts(m) + TransformTable(m) + Row(top) + SheetFigures(m) +
-                     ProvenanceLine(m.provenance));
+                 Facts(m) +
+                     Row({AlbedoFigure(m),
+                          "<div class=\"grow\">" + TransformTable(m) + "</div>"}) +
+                     CurveFigures(m) + SheetFigures(m) + ProvenanceLine(m.provenance));
 }
 
 }  // namespace nacre::cli::report

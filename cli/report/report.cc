@@ -99,7 +99,7 @@ std::string SectionOn(const Found& found,
     case ArtefactKind::kSession:
       return SessionSection(found.path);
     case ArtefactKind::kCalibration:
-      return JsonSection(found.path, "Calibration");
+      return CalibrationSection(found.path);
     case ArtefactKind::kExrPicture:
     case ArtefactKind::kPngPicture:
       return PictureSection(found.path);
@@ -113,7 +113,10 @@ std::string SectionOn(const Found& found,
   }
 }
 
-std::string FolderLead(const std::vector<Found>& found) {
+std::string FolderLead(std::vector<Found> found) {
+  std::stable_sort(found.begin(), found.end(), [](const Found& a, const Found& b) {
+    return Rank(a.kind) < Rank(b.kind);
+  });
   std::vector<std::string> names;
   for (const Found& f : found) {
     const std::string name = IsPicture(f.kind) ? "picture" : Name(f.kind);
@@ -121,8 +124,8 @@ std::string FolderLead(const std::vector<Found>& found) {
       names.push_back(name);
     }
   }
-  return "From measurement to picture: " +
-         Escape(fmt::format("{}", fmt::join(names, ", "))) + ".";
+  return Escape(
+      fmt::format("From measurement to picture: {}.", fmt::join(names, ", ")));
 }
 
 std::string FolderReport(const fs::path& folder, const ProgressFunction& progress) {

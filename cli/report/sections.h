@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/json.h"
+#include "core/json_fwd.h"
 #include "core/progress.h"
 
 #include <filesystem>
@@ -16,14 +16,12 @@ std::string DatasetSection(const std::filesystem::path& path,
                            const ProgressFunction& progress);
 std::string MaterialSection(const std::filesystem::path& path);
 std::string SessionSection(const std::filesystem::path& folder);
+std::string CalibrationSection(const std::filesystem::path& path);
 
 /// Pictures, EXR or PNG. `css_class` "hero" for the one that a page is about.
 std::string PictureSection(const std::filesystem::path& path);
 std::string PictureFigure(const std::filesystem::path& path,
                           const std::string& css_class);
-
-/// Any JSON object: its scalars as facts.
-std::string JsonSection(const std::filesystem::path& path, const std::string& title);
 
 /// The table of time, memory and error from stages.json; `json` is that file's content,
 /// `origin` its name for messages.

@@ -5,6 +5,9 @@
 #ifdef NACRE_HAS_ACQUIRE
 #include "acquire/session.h"
 #endif
+#ifdef NACRE_HAS_CALIBRATE
+#include "calibrate/calibration.h"
+#endif
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +16,7 @@
 namespace nacre::cli::report {
 namespace {
 
+#if !defined(NACRE_HAS_ACQUIRE) || !defined(NACRE_HAS_CALIBRATE)
 // Scalars of an object, and of the objects in it with their key before, as facts.
 void AddScalars(const Json& json, const std::string& prefix, std::vector<Fact>& facts) {
   constexpr std::size_t kMaxText = 60;
@@ -31,6 +35,47 @@ void AddScalars(const Json& json, const std::string& prefix, std::vector<Fact>& 
     }
   }
 }
+
+#endif
+
+#ifdef NACRE_HAS_CALIBRATE
+
+std::string CalibrationBody(const std::filesystem::path& path) {
+  const calibrate::Calibration c = calibrate::ReadCalibration(path);
+  std::string body = FactList(
+      {{"Reprojection, rms", Number(c.reprojection_rms_px) + " px"},
+       {"Laser map, rms", Number(c.laser_map_rms_mm) + " mm"},
+       {"Laser map, largest", Number(c.laser_map_max_mm) + " mm"},
+       {"Focal length",
+        fmt::format(
+            "{} × {} px", Number(c.camera.fx_px, 4), Number(c.camera.fy_px, 4))},
+       {"Distortion k<sub>1</sub>, k<sub>2</sub>",
+        Number(c.camera.k1) + ", " + Number(c.camera.k2)},
+       {"Dark level", Number(c.dark.offset_counts) + " counts"},
+       {"Gain", Number(c.gain_electrons_per_count) + " e<sup>−</sup> a count"},
+       {"Read noise", Number(c.read_noise_electrons) + " e<sup>−</sup>"},
+       {"Saturation", Number(c.saturation_counts, 4) + " counts"}});
+  std::vector<std::vector<std::string>> rows;
+  for (const calibrate::ChannelResponse& channel : c.channels) {
+    rows.push_back({Escape(channel.name),
+                    Number(channel.flux_scale_counts_mm2_sr_per_us, 4),
+                    "± " + Percent(channel.flux_scale_spread)});
+  }
+  return body + Table({"Channel",
+                       "flux scale kΦ (counts mm<sup>2</sup> sr µs<sup>−1</sup>)",
+                       "over the reference target"},
+                      rows);
+}
+
+#else
+
+std::string CalibrationBody(const std::filesystem::path& path) {
+  std::vector<Fact> facts;
+  AddScalars(ReadJson(path), "", facts);
+  return FactList(facts);
+}
+
+#endif
 
 #ifdef NACRE_HAS_ACQUIRE
 
@@ -98,7 +143,8 @@ std::string SessionBody(const std::filesystem::path& folder) {
   const std::int64_t all = session.schedule().size();
   std::string body = FactList(
       {{"Sample", Escape(session.rig().sample.name)},
-       {"Rig", Escape(m.rig_file + " (" + session.rig().kind + ")")},
+       {"Rig",
+        Escape(session.rig().kind) + "<br><code>" + Escape(m.rig_file) + "</code>"},
        {"Camera", Escape(m.camera.model)},
        {"Sensor",
         fmt::format(
@@ -144,10 +190,8 @@ std::string SessionSection(const std::filesystem::path& folder) {
   return Section("Capture session", folder.filename().string(), SessionBody(folder));
 }
 
-std::string JsonSection(const std::filesystem::path& path, const std::string& title) {
-  std::vector<Fact> facts;
-  AddScalars(ReadJson(path), "", facts);
-  return Section(title, path.filename().string(), FactList(facts));
+std::string CalibrationSection(const std::filesystem::path& path) {
+  return Section("Calibration", path.filename().string(), CalibrationBody(path));
 }
 
 }  // namespace nacre::cli::report

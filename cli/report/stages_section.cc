@@ -52,7 +52,7 @@ std::string StagesSection(const Json& json, const std::string& origin) {
   const auto row = [&](const Stage& stage, const std::string& bar) {
     rows.push_back({Escape(stage.name),
                     "<code>" + Escape(stage.output) + "</code>",
-                    Escape(stage.error),
+                    Prose(stage.error),
                     bar,
                     fmt::format("{:.1f}", stage.seconds),
                     fmt::format("{:.1f}", stage.cpu_seconds),

@@ -36,7 +36,8 @@ h3 { font-size: 1rem; font-weight: 620; margin: 30px 0 8px; }
 code { font: 0.86em/1.4 ui-monospace, "SF Mono", "Cascadia Mono", "Noto Sans Mono",
   "Liberation Mono", monospace; color: var(--soft); overflow-wrap: anywhere; }
 p { margin: 8px 0; max-width: 48em; }
-sup { font-size: 0.72em; line-height: 0; }
+sup, sub { font-size: 0.72em; line-height: 0; }
+td code { white-space: nowrap; }
 dl { display: grid; grid-template-columns: repeat(auto-fit, minmax(148px, 1fr));
   gap: 14px 24px; margin: 6px 0 22px; padding: 16px 20px; background: var(--panel);
   border-radius: 8px; }
@@ -64,6 +65,9 @@ figcaption::before { content: "Figure " counter(figure) ". "; color: var(--ink);
 img { display: block; max-width: 100%; height: auto; border-radius: 3px; }
 img.pixels { image-rendering: pixelated; width: 100%; }
 img.hero { margin: 0 auto; border-radius: 6px; }
+figure.hero figcaption { text-align: center; margin-left: auto; margin-right: auto; }
+.grow { flex: 1 1 420px; min-width: 0; }
+.grow > :first-child { margin-top: 4px; }
 .row { display: flex; flex-wrap: wrap; gap: 4px 36px; align-items: flex-start; }
 .row > figure { flex: 1 1 280px; min-width: 0; }
 .row > figure.narrow { flex: 0 1 290px; }

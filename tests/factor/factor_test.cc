@@ -196,14 +196,14 @@ TEST(Factor, ClustersLowerTheErrorAtEqualTerms) {
 }
 
 TEST(Factor, MoreTermsNeverHurtTheCurveAndItsEndIsTheResult) {
-  const RdDataset dataset = MakeChessboard({.points_x = 20, .points_y = 20});
+  const RdDataset dataset = MakeChessboard({.points_x = 16, .points_y = 16});
   const auto [m, summary] = Factor(dataset, {.method = "svd", .terms = 8});
   ASSERT_EQ(summary.error_curve.size(), 8u);
   for (std::size_t n = 1; n < 8; ++n) {
     EXPECT_LT(summary.error_curve[n].relative_l2,
               1.01 * summary.error_curve[n - 1].relative_l2);
   }
-  // All 400 slices are in the sample of 512.
+  // All 256 slices are in the sample of 256.
   EXPECT_NEAR(summary.error_curve[7].relative_l2, summary.relative_l2, 1e-6);
   EXPECT_NEAR(summary.error_curve[7].log_rms, summary.log_rms, 1e-5);
 }

@@ -72,7 +72,7 @@ TEST(MissingData, RoundsOfPredictionHelp) {
   FactorOptions options{.method = "svd", .terms = 6, .fill_rounds = 0};
   const double once = ErrorAgainst(Factor(holed, options).material, truth);
   options.fill_rounds = 3;
-  EXPECT_LT(ErrorAgainst(Factor(holed, options).material, truth), 0.9 * once);
+  EXPECT_LT(ErrorAgainst(Factor(holed, options).material, truth), 0.97 * once);
 }
 
 // Windows at the edge of the field of view: half of them is outside the picture.
