@@ -2,15 +2,12 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "rigs/transport/diffusion/beam_footprint.h"
-#include "rigs/transport/diffusion/local_domain.h"
-#include "rigs/transport/diffusion/near_field.h"
-#include "rigs/transport/diffusion/neighbourhoods.h"
-#include "rigs/transport/diffusion/radial_profile.h"
+#include "rigs/transport/diffusion/internal/diffusion_state.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -19,59 +16,9 @@ namespace nacre::rigs {
 
 using diffusion::BeamPoint;
 using diffusion::ChannelSetup;
-using diffusion::DomainLayout;
 using diffusion::LocalDomain;
-using diffusion::Mesh;
 using diffusion::NearField;
 using diffusion::Neighbourhood;
-using diffusion::PatternFractions;
-using diffusion::RadialProfile;
-
-struct DiffusionTransport::Channel {
-  ChannelSetup setup;
-  int refine = 1;  // columns across a cell of the grid, odd
-  double step_mm = 1;
-  std::vector<BeamPoint> beam;
-  std::vector<RadialProfile> profiles;
-  std::unique_ptr<NearField> near_field;
-  double reach_mm = 0;
-};
-
-struct DiffusionTransport::Impl {
-  Phantom phantom;
-  DiffusionOptions options;
-  double pitch_mm = 1;  // of the grid, or of columns if there is none
-  int core = 1;
-  std::vector<Channel> channels;
-
-  // A mesh for the beams of one neighbourhood, and what it is filled with.
-  struct Scene {
-    Mesh mesh;
-    PatternFractions fractions;
-    int margin = 0;
-    int nx = 0;
-  };
-  Scene MakeScene(const Channel& channel, const Neighbourhood& place) const;
-  template <class Real>
-  void AddBeam(const Channel& channel,
-               const Scene& scene,
-               const Neighbourhood& place,
-               PointMm x_i,
-               std::size_t lane,
-               LocalDomain<Real>& domain) const;
-  void ReadWindow(const Channel& channel,
-                  const Scene& scene,
-                  const Neighbourhood& place,
-                  PointMm x_i,
-                  const std::function<double(std::size_t column)>& exitance,
-                  float* rd) const;
-  LocalDomain<float>::Budget BudgetAt(PointMm x_i, std::size_t channel) const;
-  std::size_t CentreColumn(const Channel& channel,
-                           const Scene& scene,
-                           const Neighbourhood& place,
-                           PointMm x_i) const;
-  std::vector<Window> Solve(const Neighbourhood& place) const;
-};
 
 namespace {
 
@@ -93,6 +40,42 @@ double ShortestFreePathMm(const Phantom& phantom, std::size_t channel) {
 
 }  // namespace
 
+DiffusionTransport::Channel DiffusionTransport::Impl::MakeChannel(
+    std::size_t c, const ReferenceProfile& reference) const {
+  const double half_window_mm = 0.5 * core * pitch_mm;
+  Channel channel;
+  channel.setup = diffusion::MakeChannelSetup(phantom, c, options, half_window_mm);
+  const ChannelSetup& setup = channel.setup;
+  channel.refine =
+      OddAtLeast(pitch_mm / (options.step_free_paths * setup.shortest_free_path_mm));
+  channel.step_mm = pitch_mm / channel.refine;
+  channel.beam = diffusion::BeamFootprint(phantom.beam, channel.step_mm);
+  const double last_mm =
+      2 * (half_window_mm + setup.margin_mm + 10 * setup.shortest_free_path_mm);
+  for (std::size_t m = 0; m < setup.substances.size(); ++m) {
+    const RobinSlab exact(setup.substances[m].slab);
+    channel.profiles.emplace_back(
+        [&](double r_mm) {
+          return reference ? reference(m, c, r_mm) : exact.Reflectance(r_mm);
+        },
+        1e-4 * setup.shortest_free_path_mm,
+        last_mm,
+        options.thread_count);
+    channel.reach_mm =
+        std::max(channel.reach_mm,
+                 channel.profiles.back().Reach(1e-4) + 0.5 * phantom.beam.width_mm);
+  }
+  channel.near_field = std::make_unique<NearField>(
+      setup,
+      NearField::Request{.step_mm = channel.step_mm,
+                         .half_columns = (core * channel.refine - 1) / 2,
+                         .reciprocal_exit = options.reciprocal_exit,
+                         .tolerance = std::min(options.tolerance, 1e-8)},
+      channel.beam,
+      channel.profiles);
+  return channel;
+}
+
 DiffusionTransport::DiffusionTransport(const Phantom& phantom,
                                        const DiffusionOptions& options,
                                        const ReferenceProfile& reference) {
@@ -109,46 +92,18 @@ DiffusionTransport::DiffusionTransport(const Phantom& phantom,
     impl->pitch_mm = phantom.grid.pitch_mm;
     impl->core = phantom.grid.core;
   } else {
-    double shortest = std::numeric_limits<double>::infinity();
+    constexpr int kColumnsWithoutGrid = 21;
+    double shortest_mm = std::numeric_limits<double>::infinity();
     for (std::size_t c = 0; c < channel_count; ++c) {
-      shortest = std::min(shortest, ShortestFreePathMm(phantom, c));
+      shortest_mm = std::min(shortest_mm, ShortestFreePathMm(phantom, c));
     }
-    impl->pitch_mm = options.step_free_paths * shortest;
-    impl->core = 21;
+    // Nothing attenuates: MakeChannel() says so.
+    impl->pitch_mm =
+        std::isinf(shortest_mm) ? 1 : options.step_free_paths * shortest_mm;
+    impl->core = kColumnsWithoutGrid;
   }
-  const double half_window_mm = 0.5 * impl->core * impl->pitch_mm;
   for (std::size_t c = 0; c < channel_count; ++c) {
-    Channel channel;
-    channel.setup = diffusion::MakeChannelSetup(phantom, c, options, half_window_mm);
-    const ChannelSetup& setup = channel.setup;
-    channel.refine = OddAtLeast(
-        impl->pitch_mm / (options.step_free_paths * setup.shortest_free_path_mm));
-    channel.step_mm = impl->pitch_mm / channel.refine;
-    channel.beam = diffusion::BeamFootprint(phantom.beam, channel.step_mm);
-    const double last_mm =
-        2 * (half_window_mm + setup.margin_mm + 10 * setup.shortest_free_path_mm);
-    for (std::size_t m = 0; m < setup.substances.size(); ++m) {
-      const RobinSlab exact(setup.substances[m].slab);
-      channel.profiles.emplace_back(
-          [&](double r_mm) {
-            return reference ? reference(m, c, r_mm) : exact.Reflectance(r_mm);
-          },
-          1e-4 * setup.shortest_free_path_mm,
-          last_mm,
-          options.thread_count);
-      channel.reach_mm =
-          std::max(channel.reach_mm,
-                   channel.profiles.back().Reach(1e-4) + 0.5 * phantom.beam.width_mm);
-    }
-    channel.near_field = std::make_unique<NearField>(
-        setup,
-        NearField::Request{.step_mm = channel.step_mm,
-                           .half_columns = (impl->core * channel.refine - 1) / 2,
-                           .reciprocal_exit = options.reciprocal_exit,
-                           .tolerance = std::min(options.tolerance, 1e-8)},
-        channel.beam,
-        channel.profiles);
-    impl->channels.push_back(std::move(channel));
+    impl->channels.push_back(impl->MakeChannel(c, reference));
   }
   impl_ = std::move(impl);
 }
@@ -357,84 +312,6 @@ std::size_t DiffusionTransport::MemoryBytes() const {
         LocalDomain<float>(channel.setup, scene.mesh, scene.fractions).MemoryBytes());
   }
   return most;
-}
-
-// The mesh gives how much the pattern changes what a homogeneous slab would do, column
-// by column, which is smooth; the homogeneous slab's exitance at a point is the
-// profile's.
-void DiffusionTransport::AddExitance(PointMm x_i,
-                                     std::size_t channel_index,
-                                     double flux,
-                                     const PointColumns& points,
-                                     float* exitance) const {
-  const Channel& channel = impl_->channels[channel_index];
-  const Neighbourhood place = diffusion::AloneAt(x_i);
-  const Impl::Scene scene = impl_->MakeScene(channel, place);
-  const std::size_t last = channel.setup.substances.size() - 1;
-
-  // log of discrete exitance over the homogeneous one of the beam's medium.
-  const auto home = static_cast<std::size_t>(impl_->phantom.pattern.MediumAt(x_i));
-  PatternFractions same = scene.fractions;
-  for (auto* values : {&same.column, &same.east, &same.north}) {
-    std::fill(values->begin(), values->end(), home == last && last > 0 ? 1.0F : 0.0F);
-  }
-  const std::size_t centre = impl_->CentreColumn(channel, scene, place, x_i);
-  LocalDomain<double> mixed(channel.setup, scene.mesh, scene.fractions);
-  LocalDomain<double> pure(channel.setup, scene.mesh, same);
-  impl_->AddBeam(channel, scene, place, x_i, 0, mixed);
-  for (const BeamPoint& point : channel.beam) {
-    pure.AddBeam(0,
-                 static_cast<std::size_t>(static_cast<std::ptrdiff_t>(centre) +
-                                          std::ptrdiff_t{point.column_y} * scene.nx +
-                                          point.column_x),
-                 home,
-                 point.weight);
-  }
-  mixed.Solve(impl_->options.tolerance);
-  pure.Solve(impl_->options.tolerance);
-  std::vector<double> logs(scene.fractions.column.size());
-  for (std::size_t c = 0; c < logs.size(); ++c) {
-    logs[c] = std::log(std::max(mixed.Exitance(0, c), 1e-300) /
-                       std::max(pure.Exitance(0, c), 1e-300));
-  }
-
-  const auto place_on = [](const diffusion::Axis& axis, double at, int* low) {
-    int i = 0;
-    const auto above = std::upper_bound(axis.edges_mm.begin(), axis.edges_mm.end(), at);
-    i = static_cast<int>(above - axis.edges_mm.begin()) - 1;
-    i = std::clamp(at < axis.Centre(std::clamp(i, 0, axis.Count() - 1)) ? i - 1 : i,
-                   0,
-                   axis.Count() - 2);
-    *low = i;
-    const double t = (at - axis.Centre(i)) / (axis.Centre(i + 1) - axis.Centre(i));
-    return std::clamp(t, 0.0, 1.0);
-  };
-  // A pencil is one point, whatever the four that stand for it.
-  const bool pencil = impl_->phantom.beam.shape == BeamShape::kPencil;
-  for (std::size_t k = 0; k < points.count; ++k) {
-    const double x = static_cast<double>(points.x_mm[k]);
-    const double y = static_cast<double>(points.y_mm[k]);
-    int i = 0;
-    int j = 0;
-    const double s = place_on(scene.mesh.x, x, &i);
-    const double t = place_on(scene.mesh.y, y, &j);
-    const auto at = static_cast<std::size_t>(j * scene.nx + i);
-    const auto nx = static_cast<std::size_t>(scene.nx);
-    const double log_ratio = std::lerp(std::lerp(logs[at], logs[at + 1], s),
-                                       std::lerp(logs[at + nx], logs[at + nx + 1], s),
-                                       t);
-    double alone = 0;
-    if (pencil) {
-      alone = channel.profiles[home].Value(std::hypot(x - x_i.x, y - x_i.y));
-    } else {
-      for (const BeamPoint& point : channel.beam) {
-        alone += point.weight *
-                 channel.profiles[home].Value(std::hypot(
-                     x - x_i.x - point.offset_mm.x, y - x_i.y - point.offset_mm.y));
-      }
-    }
-    exitance[k] += static_cast<float>(flux * alone * std::exp(log_ratio));
-  }
 }
 
 }  // namespace nacre::rigs
