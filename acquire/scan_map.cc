@@ -1,6 +1,7 @@
 #include "acquire/scan_map.h"
 
 #include "core/error.h"
+#include "core/json.h"
 
 #include <cmath>
 

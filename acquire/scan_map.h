@@ -1,7 +1,7 @@
 #pragma once
 
 #include "acquire/illuminator.h"
-#include "core/json.h"
+#include "core/json_fwd.h"
 
 #include <array>
 #include <string>

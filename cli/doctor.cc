@@ -5,6 +5,7 @@
 #include "cli/resources.h"
 #include "cli/verbs.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "core/version.h"
 
 #include <filesystem>

@@ -3,6 +3,7 @@
 #include "factor/factor.h"
 
 #include "cli/command_line.h"
+#include "core/json.h"
 
 #include <filesystem>
 #include <memory>

@@ -1,6 +1,7 @@
 // nacre mesh: a scan to a mesh that a material fits on.
 
 #include "cli/command_line.h"
+#include "core/options_json.h"
 #include "core/provenance.h"
 #include "render/mesh_file.h"
 #include "render/mesh_prepare.h"

@@ -4,6 +4,7 @@
 
 #include "cli/command_line.h"
 #include "core/atomic_file.h"
+#include "core/json.h"
 
 #include <filesystem>
 #include <memory>

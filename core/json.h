@@ -1,13 +1,13 @@
 #pragma once
 
+#include "core/error.h"
+#include "core/json_fwd.h"
+
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
 namespace nacre {
-
-/// Keeps the order in which keys were written, so that files stay readable.
-using Json = nlohmann::ordered_json;
 
 /// Reads a whole JSON file. Throws BadData with `path:line:` where it isn't JSON.
 Json ReadJson(const std::filesystem::path& path);
@@ -21,12 +21,6 @@ Json ParseJson(const std::string& text, const std::string& origin);
 /// The value at `key`, or BadData naming `origin`, key and the expected type.
 template <class T>
 T Get(const Json& json, const char* key, const std::string& origin);
-
-}  // namespace nacre
-
-#include "core/error.h"
-
-namespace nacre {
 
 template <class T>
 T Get(const Json& json, const char* key, const std::string& origin) {

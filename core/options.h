@@ -1,7 +1,5 @@
 #pragma once
 
-#include "core/json.h"
-
 #include <limits>
 #include <string>
 #include <type_traits>
@@ -36,16 +34,6 @@ void Validate(const Options& options) {
           internal::CheckRange(name, static_cast<double>(value), range);
         }
       });
-}
-
-/// The options as a JSON object, for provenance.
-template <class Options>
-Json OptionsToJson(const Options& options) {
-  Json json = Json::object();
-  Options::Visit(options, [&](const char* name, const auto& value, Range, const char*) {
-    json[name] = value;
-  });
-  return json;
 }
 
 }  // namespace nacre

@@ -1,7 +1,7 @@
 #include "factor/factor.h"
 
-#include "core/options_json.h"
 #include "core/error.h"
+#include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
 #include "core/random.h"

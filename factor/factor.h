@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/json_fwd.h"
 #include "core/options.h"
 #include "core/progress.h"
 #include "factor/material.h"

@@ -1,3 +1,4 @@
+#include "core/json.h"
 #include "factor/factor.h"
 
 #include <cmath>

@@ -1,6 +1,7 @@
 #include "reconstruct/error_figures.h"
 
 #include "core/error.h"
+#include "core/json.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,8 +1,8 @@
 #include "reconstruct/reconstruct.h"
 
-#include "core/options_json.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
 #include "reconstruct/internal/crosstalk.h"

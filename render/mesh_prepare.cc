@@ -1,6 +1,7 @@
 #include "render/mesh_prepare.h"
 
 #include "core/error.h"
+#include "core/json.h"
 
 #include <algorithm>
 #include <array>

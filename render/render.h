@@ -1,6 +1,8 @@
 #pragma once
 
 #include "core/exr.h"
+#include "core/json.h"
+#include "core/json_fwd.h"
 #include "core/options.h"
 #include "core/progress.h"
 #include "render/scene.h"
@@ -20,7 +22,7 @@ struct RenderOptions {
   double clamp = 0;
   double points_per_patch = 4;
   double max_lit_points = 2e6;
-  double exitance_spacing = 1;
+  double exitance_spacing = 2;
   double snapshot_s = 0;
 
   template <class Self, class Visitor>

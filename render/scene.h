@@ -36,7 +36,8 @@ struct Scene {
 };
 
 struct SceneOptions {
-  std::map<std::string, std::string> defines;  ///< `$name`s, before the file's defaults
+  std::map<std::string, std::string>
+      defines{};         ///< `$name`s, before the file's defaults
   bool lenient = false;  ///< an unknown word is a note instead of an error
 };
 

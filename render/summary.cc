@@ -1,3 +1,4 @@
+#include "core/json.h"
 #include "render/render.h"
 
 #include <fmt/format.h>

@@ -44,7 +44,7 @@ TexturePtr MakeConstant(Color value);
 TexturePtr MakeCheckerboard(Color color0, Color color1, const UvMap& map);
 
 struct BitmapOptions {
-  UvMap map;
+  UvMap map{};
   WrapMode wrap_u = WrapMode::kRepeat;
   WrapMode wrap_v = WrapMode::kRepeat;
   bool nearest = false;  ///< else bilinear

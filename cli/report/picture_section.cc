@@ -4,6 +4,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/exr.h"
+#include "core/json.h"
 
 #include <algorithm>
 #include <cmath>

@@ -4,6 +4,7 @@
 #include "cli/report/html.h"
 #include "cli/report/sections.h"
 #include "core/error.h"
+#include "core/json.h"
 
 #include <algorithm>
 #include <fmt/format.h>

@@ -1,5 +1,6 @@
 #include "cli/report/html.h"
 #include "cli/report/sections.h"
+#include "core/json.h"
 
 #include <algorithm>
 #include <fmt/format.h>

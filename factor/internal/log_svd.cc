@@ -1,4 +1,4 @@
-// The SVD model of [Kurt14; Önel14, sec. 4.3]: R'_d is transformed, cut after S terms
+// The SVD model of [Kurt14; Oenel14, sec. 4.3]: R'_d is transformed, cut after S terms
 // of its singular value decomposition, a channel at a time. Where the thesis takes the
 // terms one by one from the residual, all S come from one decomposition here, which is
 // the same by Eckart and Young's theorem.

@@ -41,7 +41,7 @@ struct RowBasis {
   /// The most probable coordinates given the valid cells alone, the coordinates and the
   /// residual being taken as normally distributed: least squares where much is
   /// measured, the mean row where nothing is. The expectation step of probabilistic
-  /// principal components [TippingBishop99, sec. 3.3].
+  /// principal components [Tipping99, sec. 3.3].
   Eigen::VectorXd PartialCoordinates(std::span<const double> row,
                                      std::span<const std::uint8_t> valid) const;
 };

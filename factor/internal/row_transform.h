@@ -5,7 +5,7 @@
 namespace nacre::factor::internal {
 
 /// The map between R_d and the numbers that are factored, a channel at a time:
-/// s = ln(R/A + B) [Kurt14; Önel14, eq. 4.4], or s = R/A for the linear model. Written
+/// s = ln(R/A + B) [Kurt14; Oenel14, eq. 4.4], or s = R/A for the linear model. Written
 /// with log1p and expm1 around R = 0, s = ln B + log1p(R / AB), since R/A is down to
 /// 1e-8 in the tails and ln(R/A + B) would keep nothing of it.
 struct RowTransform {

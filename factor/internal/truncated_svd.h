@@ -26,7 +26,7 @@ LeadingEigen ComputeLeadingEigen(const Eigen::MatrixXd& gram,
 /// are 32-bit floats, so smaller ones hold their rounding only.
 inline constexpr double kRankTolerance = 1e-7;
 
-/// Y ≈ scores · basisᵀ, the best approximation of that rank [EckartYoung36].
+/// Y ≈ scores · basisᵀ, the best approximation of that rank [Eckart36].
 struct TruncatedSvd {
   Eigen::VectorXd sigma;   ///< singular values, largest first
   Eigen::MatrixXd scores;  ///< rows × terms: U Σ

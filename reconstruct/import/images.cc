@@ -1,9 +1,9 @@
 #include "reconstruct/import/images.h"
 
-#include "core/options_json.h"
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/hash.h"
+#include "core/options_json.h"
 #include "core/png.h"
 #include "core/provenance.h"
 #include "reconstruct/import/pfm.h"

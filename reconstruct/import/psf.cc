@@ -1,7 +1,7 @@
 #include "reconstruct/import/psf.h"
 
-#include "core/options_json.h"
 #include "core/error.h"
+#include "core/options_json.h"
 #include "core/provenance.h"
 #include "reconstruct/internal/little_endian.h"
 #include "reconstruct/internal/psf_layout.h"

@@ -27,8 +27,8 @@ BsdfPtr MakePlastic(const PlasticParameters& parameters);
 BsdfPtr MakeRoughPlastic(const PlasticParameters& parameters, const Microfacet& facets);
 
 struct ConductorParameters {
-  Color eta;  ///< of the metal relative to the outside
-  Color k;
+  Color eta{};  ///< of the metal relative to the outside
+  Color k{};
   TexturePtr specular_reflectance;  ///< 1: physical
   bool perfect = false;             ///< reflects everything, eta and k ignored
 };

@@ -96,7 +96,7 @@ TEST(SceneReaderTest, ReadsLights) {
   EXPECT_EQ(std::get<PointLight>(scene.lights[0].source).intensity, (Color{1, 2, 3}));
   const auto& spot = std::get<SpotLight>(scene.lights[1].source);
   EXPECT_EQ(spot.direction, (Vec3{0, 0, -1}));
-  EXPECT_NEAR(spot.beam_rad, 0.75 * spot.cutoff_rad, 1e-6);
+  EXPECT_NEAR(spot.beam_rad, 0.75F * spot.cutoff_rad, 1e-6);
   EXPECT_EQ(std::get<DirectionalLight>(scene.lights[2].source).direction,
             (Vec3{0, -1, 0}));
   const Color radiance = std::get<ConstantLight>(scene.lights[3].source).radiance;

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "rigs/transport/monte_carlo/internal/packet.h"
+#include "rigs/transport/monte_carlo/symmetry.h"
 #include "rigs/transport/monte_carlo/tally.h"
 
 #include <algorithm>
@@ -91,6 +92,10 @@ Result Simulate(const Volume& volume,
                     });
   Result result = total.ToResult(options.photon_count);
   result.specular = SpecularReflectance(source, volume);
+  if (request.use_symmetry && request.window_centre.x == source.centre.x &&
+      request.window_centre.y == source.centre.y) {
+    AverageImages(Symmetries(volume, source), request, result);
+  }
   result.cpu_seconds = cpu_seconds;
   return result;
 }

@@ -30,6 +30,9 @@ struct TallyRequest {
   PointMm window_centre{};
   int window_core = 0;  ///< cells a side, row by row from the top (+y)
   double window_pitch_mm = 0;
+  /// Averages the window over the mirrorings and turns that map volume and beam to
+  /// themselves, if it is centred on the beam: up to eight times the photons a cell.
+  bool use_symmetry = false;
   int ring_count = 0;  ///< rings around window_centre, at the top
   double ring_width_mm = 0;
   int cosine_count = 0;  ///< equal bins of the exit angle's cosine in air

@@ -32,19 +32,24 @@ struct Ending {
   bool scattered = false;
 };
 
-/// A cell that photons end in, or don't: its count is binomial, so its standard error
-/// is known photon by photon. Sums of integers don't depend on their order.
+/// The fraction of the photons that ended in a cell. Each did or didn't, so their
+/// number is binomial and its standard error is known photon by photon. A cell that no
+/// photon reached is known to one photon, not exactly.
+inline Estimate BinomialEstimate(double fraction, std::int64_t photon_count) {
+  const auto n = static_cast<double>(photon_count);
+  const double some = std::min(std::max(fraction, 1 / n), std::max(1 / n, 1 - 1 / n));
+  return {fraction, std::sqrt(some * std::max(1 - some, 1 / n) / n)};
+}
+
+/// Sums of integers don't depend on their order.
 struct CountCell {
   std::int64_t count = 0;
 
   void Add(double /*always 1*/) { ++count; }
   void Merge(const CountCell& other) { count += other.count; }
-  /// A cell that no photon reached is known to one photon, not exactly.
   Estimate Get(std::int64_t photon_count) const {
-    const auto n = static_cast<double>(photon_count);
-    const double p = static_cast<double>(count) / n;
-    const double at_least = std::max(p, 1 / n);
-    return {p, std::sqrt(at_least * (1 - std::min(p, 1 - 1 / n)) / n)};
+    return BinomialEstimate(
+        static_cast<double>(count) / static_cast<double>(photon_count), photon_count);
   }
 };
 

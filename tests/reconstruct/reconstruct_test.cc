@@ -1,0 +1,270 @@
+// The simulated rig's pictures to R_d, against the phantom's truth.
+
+#include "reconstruct/reconstruct.h"
+
+#include "acquire/capture.h"
+#include "calibrate/calibrate.h"
+#include "core/atomic_file.h"
+#include "core/error.h"
+#include "reconstruct/error_figures.h"
+#include "reconstruct/rd_dataset.h"
+#include "rigs/simulated_rig.h"
+#include "rigs/transport/transport.h"
+#include "tests/support/temp_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace nacre::reconstruct {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kRig = R"(kind = "simulated"
+[sample]
+name = "stripes"
+eta = 1.4
+[grid]
+points = [12, 10]
+pitch_mm = 1.5
+core = 9
+[camera]
+exposures_us = [40000, 4000, 400]
+dark_frames = 2
+target_exposure_us = 12000
+flat_exposures_us = [3000, 12000]
+[targets]
+checkerboard_columns = 7
+checkerboard_rows = 5
+checkerboard_square_mm = 4.0
+checkerboard_poses = 6
+reference_reflectance = 0.99
+reference_exposure_us = 40
+reference_frames = 2
+laser_lattice = 5
+[scanner]
+mm_per_rad = 400.0
+channels = ["R", "IR"]
+[schedule]
+spot_spacing_cells = 10
+order_seed = 4
+[simulated]
+phantom = "phantom.toml"
+seed = 77
+[simulated.camera]
+width_px = 200
+height_px = 200
+field_mm = 40.0
+electrons_per_us_per_radiance = [6.5, 6.0]
+[simulated.laser]
+power_mw = [10.0, 8.0]
+[simulated.lamp]
+electrons_per_us = 1.4
+)";
+
+constexpr const char* kPhantom = R"(channels = ["R", "IR"]
+[slab]
+thickness_mm = 12.0
+eta = 1.4
+bottom = "air"
+[[medium]]
+name = "clear"
+sigma_a_per_mm = [0.01, 0.02]
+sigma_s_per_mm = [1.4, 1.2]
+g = 0.0
+[[medium]]
+name = "dense"
+sigma_a_per_mm = [0.05, 0.03]
+sigma_s_per_mm = [2.5, 2.2]
+g = 0.0
+[pattern]
+type = "chessboard"
+cell_mm = 5.0
+[beam]
+shape = "pencil"
+[grid]
+points = [12, 10]
+pitch_mm = 1.5
+core = 9
+)";
+
+// One capture and its calibration for all tests: it is most of the work.
+class ReconstructTest : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    shared = std::make_unique<Shared>();
+    const std::filesystem::path folder = shared->folder.path();
+    WriteFile(folder / "rig.toml", kRig);
+    WriteFile(folder / "phantom.toml", kPhantom);
+    rigs::SimulatedRig rig(folder / "rig.toml");
+    const acquire::Devices devices{rig.camera(), rig.illuminator(), rig.stage()};
+    auto writer = acquire::SessionWriter::Create(
+        folder / "session",
+        acquire::MakeManifest(
+            rig.description(), devices.camera.Info(), devices.illuminator.Info()),
+        false);
+    acquire::CaptureCalibration(writer, devices);
+    const acquire::ScanMap map =
+        calibrate::EstimateScanMap(acquire::SessionReader(folder / "session"), {});
+    acquire::CaptureGrid(writer, devices, map);
+    shared->calibration =
+        calibrate::Calibrate(acquire::SessionReader(folder / "session"), {});
+    const std::shared_ptr<const rigs::Transport> transport =
+        rigs::MakeTransport(rig.phantom(), rigs::Solver::kFast);
+    shared->truth = [transport](const RdHeader& header, int i, int j) {
+      const PointMm x_i = header.GridPoint(i, j);
+      RdSlice slice = MakeSlice(header);
+      slice.rd = transport->WindowAround({x_i.x, x_i.y}).rd;
+      return slice;
+    };
+  }
+  static void TearDownTestSuite() { shared.reset(); }
+
+  static acquire::SessionReader Session() {
+    return acquire::SessionReader(shared->folder / "session");
+  }
+  static std::filesystem::path Path(const std::string& name) {
+    return shared->folder / name;
+  }
+
+  struct Shared {
+    testing::TempFolder folder;
+    calibrate::Calibration calibration;
+    std::function<RdSlice(const RdHeader&, int, int)> truth;
+  };
+  static std::unique_ptr<Shared> shared;
+};
+std::unique_ptr<ReconstructTest::Shared> ReconstructTest::shared;
+
+TEST_F(ReconstructTest, AgreesWithTheTruth) {
+  const ReconstructSummary summary =
+      Reconstruct(Session(), shared->calibration, Path("x.rd.exr"), {});
+  EXPECT_EQ(summary.slice_count, 120);
+  EXPECT_EQ(summary.saturated_count, 0);
+  EXPECT_EQ(summary.invalid_count, 0);
+  EXPECT_NEAR(summary.spot_sigma_mm, 0.12, 0.01);  // the rig's default
+  const SliceSource measured = DatasetSource(Path("x.rd.exr"));
+  EXPECT_EQ(measured.header.eta, 1.4);
+  EXPECT_EQ(measured.header.channels, (std::vector<std::string>{"R", "IR"}));
+  const SliceSource truth{measured.header, [&](int i, int j) {
+                            return shared->truth(measured.header, i, j);
+                          }};
+  const ErrorFigures figures = CompareSlices(truth, measured);
+  // Photon noise alone is about 0.4 % in the middle cell, of which L2 mostly consists,
+  // and 0.2 % in a slice's total.
+  EXPECT_LT(figures.relative_l2, 0.012);
+  EXPECT_LT(figures.worst_total, 0.012);
+  EXPECT_NEAR(figures.energy_ratio, 1, 0.004);
+}
+
+TEST_F(ReconstructTest, SigmaIsTheNoise) {
+  Reconstruct(Session(), shared->calibration, Path("x.rd.exr"), {});
+  RdReader reader(Path("x.rd.exr"));
+  double squares = 0;
+  std::int64_t count = 0;
+  for (int j = 0; j < 10; ++j) {
+    for (int i = 0; i < 12; ++i) {
+      const RdSlice slice = reader.ReadSlice(i, j);
+      const RdSlice truth = shared->truth(reader.header(), i, j);
+      for (std::size_t k = 0; k < slice.rd.size(); ++k) {
+        ASSERT_GT(slice.sigma[k], 0.0F);
+        // Where noise dominates: out of the peak, where 1 % is the model's.
+        if (truth.rd[k] < 0.01F) {
+          squares += std::pow(
+              static_cast<double>((slice.rd[k] - truth.rd[k]) / slice.sigma[k]), 2);
+          ++count;
+        }
+      }
+    }
+  }
+  EXPECT_GT(count, 5000);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(count)), 1, 0.25);
+}
+
+TEST_F(ReconstructTest, CrosstalkIsTakenAway) {
+  ReconstructOptions off;
+  off.subtract_crosstalk = false;
+  const ReconstructSummary plain =
+      Reconstruct(Session(), shared->calibration, Path("plain.rd.exr"), off);
+  const ReconstructSummary clean =
+      Reconstruct(Session(), shared->calibration, Path("clean.rd.exr"), {});
+  EXPECT_EQ(plain.max_crosstalk, 0);
+  EXPECT_GT(clean.max_crosstalk, 0.001);
+  const auto log_error = [&](const std::filesystem::path& path) {
+    const SliceSource measured = DatasetSource(path);
+    const SliceSource truth{measured.header, [&](int i, int j) {
+                              return shared->truth(measured.header, i, j);
+                            }};
+    return CompareSlices(truth, measured).log_rms;
+  };
+  EXPECT_LT(log_error(Path("clean.rd.exr")), 0.7 * log_error(Path("plain.rd.exr")));
+}
+
+TEST_F(ReconstructTest, BytesDependOnNeitherThreadsNorMemory) {
+  ReconstructOptions options;
+  options.thread_count = 1;
+  options.memory_bytes = 1;
+  Reconstruct(Session(), shared->calibration, Path("one.rd.exr"), options);
+  for (const int threads : {2, 3}) {
+    options.thread_count = threads;
+    options.memory_bytes = 1e9;
+    Reconstruct(Session(), shared->calibration, Path("many.rd.exr"), options);
+    EXPECT_TRUE(ReadFile(Path("many.rd.exr")) == ReadFile(Path("one.rd.exr")));
+  }
+}
+
+std::string ErrorOf(const std::function<void()>& call) {
+  try {
+    call();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadData);
+    return e.what();
+  }
+  return "no error";
+}
+
+TEST_F(ReconstructTest, TheCalibrationMustBeOfTheSameRig) {
+  calibrate::Calibration other = shared->calibration;
+  other.session_rig_hash = "another";
+  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+              HasSubstr("calibration is of rig another"));
+  other = shared->calibration;
+  other.camera.width_px = 7;
+  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+              HasSubstr("200 x 200 pixels, the calibrated camera 7 x 200"));
+  other = shared->calibration;
+  other.channels.pop_back();
+  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+              HasSubstr("2 laser channels, the calibration has 1"));
+  EXPECT_FALSE(std::filesystem::exists(Path("y.rd.exr")));
+}
+
+TEST_F(ReconstructTest, MissingPicturesAreNamed) {
+  const std::filesystem::path cut = Path("cut");
+  std::filesystem::copy(Path("session"), cut, std::filesystem::copy_options::recursive);
+  const std::string journal = ReadFile(cut / "journal");
+  WriteFile(
+      cut / "journal",
+      std::string_view(journal).substr(0, journal.rfind('\n', journal.size() - 2) + 1));
+  EXPECT_THAT(
+      ErrorOf([&] {
+        Reconstruct(
+            acquire::SessionReader(cut), shared->calibration, Path("y.rd.exr"), {});
+      }),
+      HasSubstr("--resume"));
+}
+
+TEST_F(ReconstructTest, StoppingLeavesNothing) {
+  EXPECT_THROW(Reconstruct(Session(),
+                           shared->calibration,
+                           Path("y.rd.exr"),
+                           {},
+                           [](const Progress& state) { return state.done < 2; }),
+               Error);
+  EXPECT_FALSE(std::filesystem::exists(Path("y.rd.exr")));
+}
+
+}  // namespace
+}  // namespace nacre::reconstruct
