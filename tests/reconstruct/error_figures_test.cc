@@ -2,6 +2,7 @@
 
 #include "reconstruct/error_figures.h"
 
+#include "core/json.h"
 #include "core/error.h"
 #include "tests/reconstruct/datasets.h"
 
