@@ -63,10 +63,11 @@ TEST(LinePlot, LeavesOutWhatALogAxisCannotShow) {
 
 TEST(LinePlot, ConstantAndEmptyCurvesAreDrawn) {
   for (const bool log_y : {false, true}) {
-    const std::string flat =
-        LinePlot({{"", 0, {1, 2}, {3, 3}, {}, {}}}, {.log_y = log_y});
+    const std::string flat = LinePlot({{"", 0, {1, 2}, {3, 3}, {}, {}}},
+                                      {.x_label = "x", .y_label = "y", .log_y = log_y});
     EXPECT_THAT(flat, Not(HasSubstr("nan")));
-    EXPECT_THAT(LinePlot({{"", 0, {}, {}, {}, {}}}, {.log_y = log_y}),
+    EXPECT_THAT(LinePlot({{"", 0, {}, {}, {}, {}}},
+                         {.x_label = "x", .y_label = "y", .log_y = log_y}),
                 Not(HasSubstr("nan")));
   }
 }
