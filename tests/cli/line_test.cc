@@ -71,7 +71,7 @@ TEST_F(Line, TenTermsAddLittle) {
 }
 
 TEST_F(Line, PsfKeepsEveryBit) {
-  RunJson({"export", File("sample.rd.exr"), "--to", "psf", "--out", File("a.psf")});
+  RunJson({"export", File("truth.rd.exr"), "--to", "psf", "--out", File("a.psf")});
   RunJson({"import",
            File("a.psf"),
            "--from",
@@ -82,7 +82,7 @@ TEST_F(Line, PsfKeepsEveryBit) {
            File("back.rd.exr")});
   RunJson({"export", File("back.rd.exr"), "--to", "psf", "--out", File("b.psf")});
   EXPECT_EQ(ReadFile(File("a.psf")), ReadFile(File("b.psf")));
-  const Json error = RunJson({"compare", File("sample.rd.exr"), File("back.rd.exr")});
+  const Json error = RunJson({"compare", File("truth.rd.exr"), File("back.rd.exr")});
   EXPECT_EQ(error.at("relative_l2").get<double>(), 0);
 }
 

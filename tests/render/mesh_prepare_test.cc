@@ -67,7 +67,7 @@ TEST(OffTest, ReadsPolygonsAndSkipsColours) {
 
 TEST(OffTest, BadFilesAreRefusedWithTheLine) {
   EXPECT_THAT(OffError("PLY\n"), HasSubstr("m.off:1: this isn't an OFF file"));
-  EXPECT_THAT(OffError("OFF\n"), HasSubstr("ends here"));
+  EXPECT_THAT(OffError("OFF\n"), HasSubstr("don't fit into 22 bytes"));
   EXPECT_THAT(OffError("OFF\n3 1 0\n0 0 0\n1 0 0\n"), HasSubstr("ends here"));
   EXPECT_THAT(OffError("OFF\n3 1 0\n0 0 0\n1 x 0\n0 1 0\n3 0 1 2\n"),
               HasSubstr("m.off:4: 'x' where a coordinate"));
