@@ -47,7 +47,7 @@ struct Clustering {
 };
 
 /// Groups the points x_i by the shape of R'_d(x_i, ·): k-means [Lloyd82] from k-means++
-/// seeds [ArthurVassilvitskii07] on random projections [Achlioptas03] of
+/// seeds [Arthur07] on random projections [Achlioptas03] of
 /// ln(R'_d / peak + offset), all channels. The same for any number of threads.
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,

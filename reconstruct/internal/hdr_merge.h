@@ -19,7 +19,7 @@ struct RateFrame {
 
 /// Merges exposures of one scene (any order) into rates: the mean weighted by the
 /// inverse variances of the noise model at the rate that all usable exposures agree on,
-/// which is the maximum-likelihood estimate [Hasinoff10, eq. 5].
+/// which is the maximum-likelihood estimate [Hasinoff10].
 RateFrame MergeExposures(std::span<const acquire::Frame> frames,
                          const calibrate::Calibration& calibration);
 

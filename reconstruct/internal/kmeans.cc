@@ -25,7 +25,7 @@ void AppendCentre(const PointSet& points, std::int64_t n, Centres& centres) {
 }
 
 // Each next centre is a point drawn in proportion to its squared distance to the
-// nearest centre so far [ArthurVassilvitskii07].
+// nearest centre so far [Arthur07].
 Centres Seed(const PointSet& points, int k, RandomStream& random) {
   const auto count = static_cast<std::size_t>(points.count);
   const auto pick =

@@ -21,7 +21,7 @@ struct Polygon {
   Corner Centroid() const;
 };
 
-/// What of `polygon` lies within [x0, x1] × [y0, y1] [SutherlandHodgman74].
+/// What of `polygon` lies within [x0, x1] × [y0, y1] [Sutherland74].
 Polygon ClipToBox(const Polygon& polygon, double x0, double y0, double x1, double y1);
 
 }  // namespace nacre::reconstruct::internal

@@ -19,8 +19,8 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
-// Level 1 packs measured values as well as higher ones do (their mantissas are noise)
-// in a third of the time; README.md has the figures.
+// Noisy floats don't pack at any level, and the rest (validity, a sigma of zeros) packs
+// at the lowest.
 constexpr int kZipLevel = 1;
 
 void SetAttributes(const RdHeader& header, Imf::Header& part) {
