@@ -22,6 +22,7 @@ namespace {
 using internal::Crosstalk;
 using internal::GroupReader;
 using internal::GroupSlices;
+using internal::OutsideCell;
 using internal::SliceSpool;
 
 void CheckSameRig(const acquire::SessionReader& session,
@@ -103,6 +104,7 @@ void Measure(const acquire::SessionReader& session,
              const ReconstructOptions& options,
              const RdHeader& header,
              SliceSpool& spool,
+             std::vector<OutsideCell>& outside,
              ReconstructSummary& summary,
              const ProgressFunction& progress) {
   const GroupReader reader(
@@ -124,6 +126,7 @@ void Measure(const acquire::SessionReader& session,
         spool.Park(std::int64_t{spots[n].j} * header.points_x + spots[n].i,
                    result.slices[n]);
       }
+      outside.insert(outside.end(), result.outside.begin(), result.outside.end());
       summary.frame_count += result.frame_count;
       summary.saturated_count += result.saturated_count;
       summary.invalid_count += result.invalid_count;
@@ -138,13 +141,14 @@ void WriteSlices(const acquire::SessionReader& session,
                  const ReconstructOptions& options,
                  const RdHeader& header,
                  const SliceSpool& spool,
+                 const std::vector<OutsideCell>& outside,
                  RdWriter& writer,
                  ReconstructSummary& summary,
                  const ProgressFunction& progress) {
   std::optional<Crosstalk> crosstalk;
   if (options.subtract_crosstalk) {
     Report(progress, {"crosstalk", 0, header.points_y, "tails"});
-    crosstalk.emplace(header, session.schedule(), spool, options.thread_count);
+    crosstalk.emplace(header, session.schedule(), spool, outside, options.thread_count);
   }
   const auto width = static_cast<std::size_t>(header.points_x);
   for (int j = 0; j < header.points_y; ++j) {
@@ -185,8 +189,9 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
       options.sharpen_spot ? internal::MeasureSpotSigmaMm(session, calibration) : 0;
   RdWriter writer(out, header);
   SliceSpool spool(AbsoluteFolder(out), header);
-  Measure(session, calibration, options, header, spool, summary, progress);
-  WriteSlices(session, options, header, spool, writer, summary, progress);
+  std::vector<OutsideCell> outside;
+  Measure(session, calibration, options, header, spool, outside, summary, progress);
+  WriteSlices(session, options, header, spool, outside, writer, summary, progress);
   writer.Finish();
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -11,51 +10,127 @@ namespace {
 // far below this share of a cell.
 constexpr double kFullCover = 0.999;
 
-// Coefficients of the five pixels of a cross, for one piece of its middle pixel.
-class Stencil {
+// A symmetric filter of five pixels along each axis: undoes a Gaussian blur of variance
+// σ² in pixels. To fourth order in the derivatives that is
+// 1 − σ²/2 ∂² + σ⁴/8 ∂⁴, and ∂² = D₂ − D₄/12 by differences of pixels.
+struct Sharpener {
+  explicit Sharpener(double variance_px2) {
+    const double first = 0.5 * variance_px2;
+    const double second = 0.5 * first * first + first / 12;
+    outer = second;
+    inner = -first - 4 * second;
+    middle = 1 + 2 * first + 6 * second;
+  }
+  double outer;
+  double inner;
+  double middle;
+};
+
+// The weights of the pixels around one cell, dense: a filter of the picture is the same
+// filter of the weights, since it is symmetric.
+class WeightBox {
  public:
-  Stencil(const calibrate::CameraGeometry& camera, double spot_sigma_mm)
-      : width_(camera.width_px), height_(camera.height_px) {
-    // Pixels aren't exactly alike in size; they are across a window.
-    const auto step = [&](double dx, double dy) {
-      const calibrate::PixelPoint centre{0.5 * (width_ - 1), 0.5 * (height_ - 1)};
-      const calibrate::PointMm a =
-          camera.SampleFromPixel({centre.x - dx, centre.y - dy});
-      const calibrate::PointMm b =
-          camera.SampleFromPixel({centre.x + dx, centre.y + dy});
-      return std::hypot(b.x - a.x, b.y - a.y);
-    };
-    const double variance_mm2 = spot_sigma_mm * spot_sigma_mm;
-    sharpen_x_ = 0.5 * variance_mm2 / std::pow(step(0.5, 0), 2);
-    sharpen_y_ = 0.5 * variance_mm2 / std::pow(step(0, 0.5), 2);
+  // Room for slopes and the filter around the pixels of the pieces.
+  static constexpr int kMargin = 3;
+
+  WeightBox(const PixelPiece* const* pieces, std::size_t count) {
+    int right = 0;
+    int bottom = 0;
+    left_ = pieces[0]->column;
+    top_ = pieces[0]->row;
+    for (std::size_t n = 0; n < count; ++n) {
+      left_ = std::min(left_, pieces[n]->column);
+      right = std::max(right, pieces[n]->column);
+      top_ = std::min(top_, pieces[n]->row);
+      bottom = std::max(bottom, pieces[n]->row);
+    }
+    left_ -= kMargin;
+    top_ -= kMargin;
+    width_ = right - left_ + 1 + kMargin;
+    height_ = bottom - top_ + 1 + kMargin;
+    weights_.assign(
+        static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), 0.0);
+    for (std::size_t n = 0; n < count; ++n) {
+      Add(*pieces[n]);
+    }
   }
 
-  void Add(const PixelPiece& piece, std::map<std::uint32_t, double>& weights) const {
-    const double area = piece.share;
-    double middle = area;
-    // Slope and curvature along one axis; at the picture's rim there is no neighbour.
-    const auto axis = [&](int at, int count, int stride, double offset, double blur) {
-      if (at == 0 || at + 1 == count) {
-        return;
+  void Sharpen(const Sharpener& along_x, const Sharpener& along_y) {
+    for (int y = 0; y < height_; ++y) {
+      Filter(along_x, Index(0, y), 1, width_);
+    }
+    for (int x = 0; x < width_; ++x) {
+      Filter(along_y, Index(x, 0), static_cast<std::size_t>(width_), height_);
+    }
+  }
+
+  // Calls visit(pixel, weight); what lies beyond the picture's rim is its rim.
+  template <class Visit>
+  void ForEach(const calibrate::CameraGeometry& camera, Visit&& visit) const {
+    constexpr double kNothing = 1e-9;
+    for (int y = 0; y < height_; ++y) {
+      for (int x = 0; x < width_; ++x) {
+        const double weight = weights_[Index(x, y)];
+        if (std::abs(weight) > kNothing) {
+          visit(std::clamp(top_ + y, 0, camera.height_px - 1) * camera.width_px +
+                    std::clamp(left_ + x, 0, camera.width_px - 1),
+                weight);
+        }
       }
-      const int pixel = piece.row * width_ + piece.column;
-      const auto next = static_cast<std::uint32_t>(pixel + stride);
-      const auto last = static_cast<std::uint32_t>(pixel - stride);
-      weights[next] += area * (0.5 * offset - blur);
-      weights[last] += area * (-0.5 * offset - blur);
-      middle += 2 * area * blur;
-    };
-    axis(piece.column, width_, 1, piece.du, sharpen_x_);
-    axis(piece.row, height_, width_, piece.dv, sharpen_y_);
-    weights[static_cast<std::uint32_t>(piece.row * width_ + piece.column)] += middle;
+    }
   }
 
  private:
+  std::size_t Index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
+  }
+
+  void Add(const PixelPiece& piece) {
+    const int x = piece.column - left_;
+    const int y = piece.row - top_;
+    weights_[Index(x, y)] += piece.share;
+    weights_[Index(x + 1, y)] += 0.5 * piece.share * piece.du;
+    weights_[Index(x - 1, y)] -= 0.5 * piece.share * piece.du;
+    weights_[Index(x, y + 1)] += 0.5 * piece.share * piece.dv;
+    weights_[Index(x, y - 1)] -= 0.5 * piece.share * piece.dv;
+  }
+
+  void Filter(const Sharpener& filter, std::size_t begin, std::size_t step, int count) {
+    line_.resize(static_cast<std::size_t>(count));
+    for (int k = 0; k < count; ++k) {
+      line_[static_cast<std::size_t>(k)] =
+          weights_[begin + static_cast<std::size_t>(k) * step];
+    }
+    const auto at = [&](int k) {
+      return k >= 0 && k < count ? line_[static_cast<std::size_t>(k)] : 0.0;
+    };
+    for (int k = 0; k < count; ++k) {
+      weights_[begin + static_cast<std::size_t>(k) * step] =
+          filter.middle * at(k) + filter.inner * (at(k - 1) + at(k + 1)) +
+          filter.outer * (at(k - 2) + at(k + 2));
+    }
+  }
+
+  int left_;
+  int top_;
   int width_;
   int height_;
-  double sharpen_x_;
-  double sharpen_y_;
+  std::vector<double> weights_;
+  std::vector<double> line_;
 };
+
+// A pixel's steps in the sample plane at the picture's centre. Pixels aren't exactly
+// alike in size; they nearly are across a picture.
+double StepMm(const calibrate::CameraGeometry& camera, double dx, double dy) {
+  const calibrate::PixelPoint centre{0.5 * (camera.width_px - 1),
+                                     0.5 * (camera.height_px - 1)};
+  const calibrate::PointMm a =
+      camera.SampleFromPixel({centre.x - 0.5 * dx, centre.y - 0.5 * dy});
+  const calibrate::PointMm b =
+      camera.SampleFromPixel({centre.x + 0.5 * dx, centre.y + 0.5 * dy});
+  return std::hypot(b.x - a.x, b.y - a.y);
+}
 
 }  // namespace
 
@@ -85,22 +160,26 @@ CellWeights::CellWeights(const CellLattice& lattice,
     }
   }
 
-  const Stencil stencil(camera, spot_sigma_mm);
+  const auto variance_px2 = [&](double dx, double dy) {
+    return std::pow(spot_sigma_mm / StepMm(camera, dx, dy), 2);
+  };
+  const Sharpener along_x(variance_px2(1, 0));
+  const Sharpener along_y(variance_px2(0, 1));
   covered_.resize(cells);
   begin_.assign(1, 0);
   for (std::size_t cell = 0; cell < cells; ++cell) {
-    std::map<std::uint32_t, double> weights;
     double covered = 0;
     for (std::size_t n = first[cell]; n < first[cell + 1]; ++n) {
-      stencil.Add(*pieces[n], weights);
       covered += pieces[n]->share;
     }
     covered_[cell] = covered >= kFullCover ? 1 : 0;
-    constexpr double kNothing = 1e-9;
-    for (const auto& [pixel, weight] : weights) {
-      if (covered_[cell] != 0 && std::abs(weight) > kNothing) {
-        shares_.push_back({pixel, static_cast<float>(weight / covered)});
-      }
+    if (covered_[cell] != 0) {
+      WeightBox box(&pieces[first[cell]], first[cell + 1] - first[cell]);
+      box.Sharpen(along_x, along_y);
+      box.ForEach(camera, [&](int pixel, double weight) {
+        shares_.push_back(
+            {static_cast<std::uint32_t>(pixel), static_cast<float>(weight / covered)});
+      });
     }
     begin_.push_back(shares_.size());
   }

@@ -14,8 +14,8 @@ namespace nacre::reconstruct::internal {
 /// The mean of a picture over a cell is a weighted sum of pixels: the weights of all
 /// cells. Radiance is taken to vary linearly within a pixel that a cell's edge cuts,
 /// with the slopes to its neighbours; and the blur of a Gaussian spot of
-/// `spot_sigma_mm` is undone to first order, M − σ²/2 ∇²M. Both move light between
-/// neighbours and keep its sum.
+/// `spot_sigma_mm` is undone to fourth order in the derivatives. Both move light
+/// between neighbours and keep its sum.
 class CellWeights {
  public:
   CellWeights(const CellLattice& lattice,

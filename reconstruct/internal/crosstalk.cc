@@ -3,6 +3,9 @@
 #include "core/parallel.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -26,6 +29,7 @@ std::vector<int> GroupsOf(const RdHeader& header, const acquire::Schedule& sched
 Crosstalk::Crosstalk(const RdHeader& header,
                      const acquire::Schedule& schedule,
                      const SliceSpool& raw,
+                     const std::vector<OutsideCell>& outside,
                      int thread_count)
     : header_(header),
       schedule_(schedule),
@@ -34,7 +38,9 @@ Crosstalk::Crosstalk(const RdHeader& header,
       group_of_(GroupsOf(header, schedule)),
       tails_(header) {
   FitTails(kUnspoilt, /*clean=*/false);
+  FitFalloff(outside);
   FitTails(1.0, /*clean=*/true);
+  FitFalloff(outside);
 }
 
 void Crosstalk::FitTails(double outer, bool clean) {
@@ -46,6 +52,102 @@ void Crosstalk::FitTails(double outer, bool clean) {
                outer);
   });
   tails_ = std::move(fitted);
+}
+
+namespace {
+
+constexpr std::size_t kNodeCount = TailMap::kNodes.size();
+using Nodes = std::array<double, kNodeCount>;
+
+// What one cell outside the windows says: Σ_n falloff_n · light_n = seen.
+struct FalloffRow {
+  Nodes light{};  ///< extrapolated, by way of each node
+  double all = 0;
+  double seen = 0;
+  double variance = 0;
+  std::size_t nearest = 0;  ///< the node that most of it goes by
+};
+
+// Adds what the tails' own spread makes of a row's trustworthiness. Within a distance
+// it is in proportion to the light, so that the fit gets the sum of the light right: to
+// weigh relative errors would trust tails that are too faint the most.
+void AddModelVariance(std::vector<FalloffRow>& rows) {
+  constexpr double kSpread = 0.1;
+  Nodes sum{};
+  Nodes count{};
+  for (const FalloffRow& row : rows) {
+    sum[row.nearest] += row.all;
+    count[row.nearest] += 1;
+  }
+  for (FalloffRow& row : rows) {
+    row.variance += kSpread * kSpread * row.all * sum[row.nearest] / count[row.nearest];
+  }
+}
+
+// Non-negative least squares by multiplicative steps [Lee01], which leave a node alone
+// that no row tells of.
+Nodes SolveFalloff(const std::vector<FalloffRow>& rows) {
+  constexpr int kSteps = 200;
+  Nodes falloff;
+  falloff.fill(1);
+  for (int step = 0; step < kSteps; ++step) {
+    Nodes seen{};
+    Nodes predicted{};
+    for (const FalloffRow& row : rows) {
+      const double sum =
+          std::inner_product(falloff.begin(), falloff.end(), row.light.begin(), 0.0);
+      for (std::size_t n = 0; n < kNodeCount; ++n) {
+        seen[n] += row.light[n] * row.seen / row.variance;
+        predicted[n] += row.light[n] * sum / row.variance;
+      }
+    }
+    for (std::size_t n = 0; n < kNodeCount; ++n) {
+      falloff[n] *= predicted[n] > 0 ? std::max(0.0, seen[n]) / predicted[n] : 1;
+    }
+  }
+  return falloff;
+}
+
+}  // namespace
+
+void Crosstalk::FitFalloff(const std::vector<OutsideCell>& outside) {
+  const int radius = header_.Radius();
+  for (int c = 0; c < static_cast<int>(header_.channels.size()); ++c) {
+    tails_.SetFalloff(c, {1, 1, 1, 1, 1});
+    std::vector<FalloffRow> rows;
+    for (const OutsideCell& cell : outside) {
+      if (cell.channel != c) {
+        continue;
+      }
+      FalloffRow row;
+      row.seen = static_cast<double>(cell.rd);
+      row.variance = std::pow(static_cast<double>(cell.sigma), 2);
+      for (const acquire::GridIndex& spot : schedule_.Group(cell.group)) {
+        const int du = cell.column - radius - spot.i;
+        const int dv = cell.row - radius - spot.j;
+        const auto light =
+            static_cast<double>(tails_.Extrapolate(spot.i, spot.j, c, du, dv));
+        const TailMap::Place place = tails_.PlaceOf(du, dv);
+        const auto node = static_cast<std::size_t>(place.node);
+        const auto second = static_cast<double>(place.second);
+        row.light[node] += (1 - second) * light;
+        row.light[node + 1] += second * light;
+        row.all += light;
+      }
+      row.nearest = static_cast<std::size_t>(
+          std::max_element(row.light.begin(), row.light.end()) - row.light.begin());
+      if (row.all > 0) {
+        rows.push_back(row);
+      }
+    }
+    AddModelVariance(rows);
+    const Nodes falloff = SolveFalloff(rows);
+    TailMap::Falloff rounded{};
+    std::transform(falloff.begin(), falloff.end(), rounded.begin(), [](double value) {
+      return static_cast<float>(value);
+    });
+    tails_.SetFalloff(c, rounded);
+  }
 }
 
 RdSlice Crosstalk::Clean(std::int64_t s, double* share) const {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "acquire/schedule.h"
+#include "reconstruct/internal/group_slices.h"
 #include "reconstruct/internal/slice_spool.h"
 #include "reconstruct/internal/tails.h"
 #include "reconstruct/rd_dataset.h"
@@ -11,15 +12,17 @@
 namespace nacre::reconstruct::internal {
 
 /// Takes the light of the other spots of the same picture out of slices. What a window
-/// holds of it is extrapolated from the tails of those spots' own slices, which are
-/// known better once their own windows are cleaned: so tails are fitted twice, first to
-/// the inner parts alone.
+/// holds of it is extrapolated from the tails of those spots' own slices; how tails go
+/// on beyond a window is seen where a picture is outside all windows. Both are known
+/// better once the windows are cleaned, so this is done twice, first with the windows'
+/// inner parts alone.
 class Crosstalk {
  public:
   /// `raw` holds all slices as measured; all must outlive this.
   Crosstalk(const RdHeader& header,
             const acquire::Schedule& schedule,
             const SliceSpool& raw,
+            const std::vector<OutsideCell>& outside,
             int thread_count);
 
   /// The cleaned slice s. `share` is set to the largest share of a channel's total that
@@ -28,6 +31,7 @@ class Crosstalk {
 
  private:
   void FitTails(double outer, bool clean);
+  void FitFalloff(const std::vector<OutsideCell>& outside);
 
   const RdHeader& header_;
   const acquire::Schedule& schedule_;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -63,6 +64,58 @@ RateFrame GroupReader::ReadRates(int group, int channel, GroupSlices& result) co
   return rates;
 }
 
+CellWeights::Value GroupReader::Measure(const RateFrame& rates,
+                                        std::int64_t cell,
+                                        double enter_factor) const {
+  CellWeights::Value value = weights_.Mean(rates, cell);
+  const double factor = enter_factor * exit_factor_[static_cast<std::size_t>(cell)];
+  value.mean *= factor;
+  value.variance *= factor * factor;
+  return value;
+}
+
+// A picture's spots enter at slightly different angles; for tails the first one's
+// factor is good enough for all.
+void GroupReader::SampleOutside(const RateFrame& rates,
+                                int group,
+                                int channel,
+                                GroupSlices& result) const {
+  const auto spots = session_.schedule().Group(group);
+  const CellLattice& lattice = weights_.lattice();
+  const auto is_outside = [&](int column, int row) {
+    return std::none_of(
+        spots.begin(), spots.end(), [&](const acquire::GridIndex& spot) {
+          return column >= spot.i && column < spot.i + header_.core && row >= spot.j &&
+                 row < spot.j + header_.core;
+        });
+  };
+  const PointMm x_i = header_.GridPoint(spots[0].i, spots[0].j);
+  const double enter =
+      calibration_.RdPerRate(channel, {x_i.x, x_i.y}, {0, 0}, header_.eta);
+  // A stride prime to the lattice's width walks through all columns and rows.
+  constexpr std::int64_t kSamples = 256;
+  std::int64_t stride = std::max<std::int64_t>(1, lattice.CellCount() / kSamples);
+  while (std::gcd(stride, std::int64_t{lattice.columns}) != 1) {
+    ++stride;
+  }
+  for (std::int64_t cell = group % stride; cell < lattice.CellCount(); cell += stride) {
+    const int column = static_cast<int>(cell % lattice.columns);
+    const int row = static_cast<int>(cell / lattice.columns);
+    if (!is_outside(column, row)) {
+      continue;
+    }
+    const CellWeights::Value value = Measure(rates, cell, enter);
+    if (value.valid) {
+      result.outside.push_back({group,
+                                channel,
+                                column,
+                                row,
+                                static_cast<float>(value.mean),
+                                static_cast<float>(std::sqrt(value.variance))});
+    }
+  }
+}
+
 GroupSlices GroupReader::Read(int group) const {
   const auto spots = session_.schedule().Group(group);
   const CellLattice& lattice = weights_.lattice();
@@ -70,20 +123,20 @@ GroupSlices GroupReader::Read(int group) const {
   result.slices.assign(spots.size(), MakeSlice(header_));
   for (int c = 0; c < static_cast<int>(header_.channels.size()); ++c) {
     const RateFrame rates = ReadRates(group, c, result);
+    SampleOutside(rates, group, c, result);
     for (std::size_t k = 0; k < spots.size(); ++k) {
       const auto [i, j] = spots[k];
       const PointMm x_i = header_.GridPoint(i, j);
       const double enter =
           calibration_.RdPerRate(c, {x_i.x, x_i.y}, {0, 0}, header_.eta);
+      RdSlice& slice = result.slices[k];
       auto at = static_cast<std::size_t>(c * header_.WindowSize());
       for (int v = 0; v < header_.core; ++v) {
         for (int u = 0; u < header_.core; ++u, ++at) {
-          const std::int64_t cell = lattice.Index(i + u, j + v);
-          const CellWeights::Value value = weights_.Mean(rates, cell);
-          const double factor = enter * exit_factor_[static_cast<std::size_t>(cell)];
-          RdSlice& slice = result.slices[k];
-          slice.rd[at] = static_cast<float>(factor * value.mean);
-          slice.sigma[at] = static_cast<float>(factor * std::sqrt(value.variance));
+          const CellWeights::Value value =
+              Measure(rates, lattice.Index(i + u, j + v), enter);
+          slice.rd[at] = static_cast<float>(value.mean);
+          slice.sigma[at] = static_cast<float>(std::sqrt(value.variance));
           slice.valid[at] = value.valid ? 1 : 0;
           result.invalid_count += value.valid ? 0 : 1;
         }

@@ -10,10 +10,21 @@
 
 namespace nacre::reconstruct::internal {
 
+/// A cell of the lattice outside all windows of a picture: nothing but tails.
+struct OutsideCell {
+  int group = 0;
+  int channel = 0;
+  int column = 0;
+  int row = 0;
+  float rd = 0;  ///< the sum over the picture's spots
+  float sigma = 0;
+};
+
 /// The slices that one group of spots gives, as measured: light of the group's other
 /// spots is still in them.
 struct GroupSlices {
-  std::vector<RdSlice> slices;  ///< of Schedule::Group(group), in that order
+  std::vector<OutsideCell> outside;  ///< some of these cells, spread evenly
+  std::vector<RdSlice> slices;       ///< of Schedule::Group(group), in that order
   std::int64_t frame_count = 0;
   std::int64_t saturated_count = 0;
   std::int64_t invalid_count = 0;
@@ -37,6 +48,14 @@ class GroupReader {
 
  private:
   RateFrame ReadRates(int group, int channel, GroupSlices& result) const;
+  /// R_d at `cell` and its variance, from light that entered with that factor.
+  CellWeights::Value Measure(const RateFrame& rates,
+                             std::int64_t cell,
+                             double enter_factor) const;
+  void SampleOutside(const RateFrame& rates,
+                     int group,
+                     int channel,
+                     GroupSlices& result) const;
 
   const acquire::SessionReader& session_;
   const calibrate::Calibration& calibration_;

@@ -25,13 +25,26 @@ struct Ring {
   double count = 0;
 };
 
+TailMap::Place PlaceAt(double half_widths) {
+  const auto& nodes = TailMap::kNodes;
+  const double at = std::clamp(half_widths, nodes.front(), nodes.back());
+  std::size_t n = 0;
+  while (n + 2 < nodes.size() && at >= nodes[n + 1]) {
+    ++n;
+  }
+  return {static_cast<int>(n),
+          static_cast<float>((at - nodes[n]) / (nodes[n + 1] - nodes[n]))};
+}
+
 }  // namespace
 
 TailMap::TailMap(const RdHeader& header)
     : header_(header),
       channels_(static_cast<int>(header.channels.size())),
       reach_(3 * header.core),
-      tails_(static_cast<std::size_t>(header.PointCount() * channels_ * kSectors)) {
+      tails_(static_cast<std::size_t>(header.PointCount() * channels_ * kSectors)),
+      falloff_(static_cast<std::size_t>(channels_), Falloff{1, 1, 1, 1, 1}) {
+  const double half_width_mm = (header.Radius() + 0.5) * header.pitch_mm;
   for (int dv = -reach_; dv <= reach_; ++dv) {
     for (int du = -reach_; du <= reach_; ++du) {
       const double r_mm = std::hypot(du, dv) * header.pitch_mm;
@@ -39,7 +52,8 @@ TailMap::TailMap(const RdHeader& header)
       const int sector = static_cast<int>(std::lround(turn * kSectors) + kSectors);
       ways_.push_back({static_cast<float>(r_mm),
                        static_cast<float>(r_mm > 0 ? 2 * std::log(r_mm) : 0.0),
-                       sector % kSectors});
+                       sector % kSectors,
+                       PlaceAt(r_mm / half_width_mm)});
     }
   }
 }
@@ -131,7 +145,14 @@ float TailMap::Extrapolate(int i, int j, int channel, int du, int dv) const {
   const float log_r2_rd = !back.known    ? there_log
                           : !there.known ? back_log
                                          : 0.5F * (there_log + back_log);
-  return std::exp(log_r2_rd - way.log_r2);
+  const Falloff& falloff = falloff_[static_cast<std::size_t>(channel)];
+  const auto node = static_cast<std::size_t>(way.place.node);
+  return std::exp(log_r2_rd - way.log_r2) *
+         std::lerp(falloff[node], falloff[node + 1], way.place.second);
+}
+
+TailMap::Place TailMap::PlaceOf(int du, int dv) const {
+  return std::abs(du) > reach_ || std::abs(dv) > reach_ ? Place{} : WayTo(du, dv).place;
 }
 
 }  // namespace nacre::reconstruct::internal

@@ -2,6 +2,7 @@
 
 #include "reconstruct/rd_dataset.h"
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -9,9 +10,16 @@ namespace nacre::reconstruct::internal {
 
 /// What is known of R_d beyond the windows: in each of eight directions, the outer part
 /// of a slice is fitted by R_d = exp(a − κ r) / r², the form of a diffuse tail
-/// [Jensen01, eq. 4].
+/// [Jensen01, eq. 4]. Farther out tails may fall faster, in a slab for instance, of
+/// which a window says nothing: that is what the falloff corrects, a factor a channel
+/// and distance.
 class TailMap {
  public:
+  /// Distances at which the falloff is given, in half widths of a window. Linear in
+  /// between, constant outside.
+  static constexpr std::array<double, 5> kNodes = {1.0, 1.4, 2.0, 3.0, 4.5};
+  using Falloff = std::array<float, kNodes.size()>;
+
   explicit TailMap(const RdHeader& header);
 
   /// Fits the tails of slice (i, j) from its values within `outer` (0 … 1) of the
@@ -22,6 +30,21 @@ class TailMap {
   /// it: by reciprocity the light's way back is as good a witness, and knows the
   /// material at x_o, so this is the geometric mean of both. 0 beyond the reach.
   float Extrapolate(int i, int j, int channel, int du, int dv) const;
+
+  void SetFalloff(int channel, const Falloff& falloff) {
+    falloff_[static_cast<std::size_t>(channel)] = falloff;
+  }
+  const Falloff& falloff(int channel) const {
+    return falloff_[static_cast<std::size_t>(channel)];
+  }
+
+  /// Shares of the two nodes around the distance of (du, dv): node n has 1 − second,
+  /// node n + 1 has second.
+  struct Place {
+    int node = 0;
+    float second = 0;
+  };
+  Place PlaceOf(int du, int dv) const;
 
   /// Cells beyond which tails are taken to be nothing: three windows.
   int Reach() const { return reach_; }
@@ -36,6 +59,7 @@ class TailMap {
     float r_mm;
     float log_r2;
     int sector;
+    Place place;
   };
   static constexpr int kSectors = 8;
 
@@ -55,6 +79,7 @@ class TailMap {
   int reach_;
   std::vector<Way> ways_;
   std::vector<Tail> tails_;
+  std::vector<Falloff> falloff_;
 };
 
 }  // namespace nacre::reconstruct::internal

@@ -2,8 +2,8 @@
 
 #include "reconstruct/error_figures.h"
 
-#include "core/json.h"
 #include "core/error.h"
+#include "core/json.h"
 #include "tests/reconstruct/datasets.h"
 
 #include <gmock/gmock.h>
