@@ -19,8 +19,9 @@ struct RenderOptions {
   std::uint64_t seed = 1;
   int thread_count = 0;
   double time_limit_s = 0;
+  double error_target = 0;
   double clamp = 0;
-  double points_per_patch = 4;
+  double points_per_patch = 16;
   double max_lit_points = 2e6;
   double exitance_spacing = 2;
   double snapshot_s = 0;
@@ -37,6 +38,11 @@ struct RenderOptions {
           self.time_limit_s,
           Range{0, 1e9},
           "seconds after which no further pass is started; 0: none");
+    visit("error_target",
+          self.error_target,
+          Range{0, 1e3},
+          "relative L2 error at which to stop, estimated from the samples' variance; "
+          "0: none. Without --spp up to 65536 samples a pixel are made");
     visit("clamp",
           self.clamp,
           Range{0, 1e30},
@@ -68,6 +74,7 @@ struct RenderSummary {
   int samples_per_pixel = 0;  ///< made; less than asked for if time ran out
   int thread_count_used = 0;
   bool time_ran_out = false;
+  double relative_error = 0;  ///< of the luminance, as Accumulator estimates it
   std::int64_t triangles = 0;
   std::int64_t lights = 0;
   std::int64_t lit_points = 0;

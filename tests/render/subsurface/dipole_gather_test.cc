@@ -94,6 +94,33 @@ TEST(DipoleGather, KnifeEdgeMatchesTheIntegral) {
   }
 }
 
+// The part of a sphere within a distance r, measured through space, of one of its
+// points has the area π r² [Archimedes]: gathered over it, R_d gives what a plane's
+// disc gives.
+TEST(DipoleGather, UniformlyLitSphereGivesTheFluxWithinItsDiameter) {
+  for (const float radius : {3.0F, 9.0F}) {
+    const auto model = MakeDipole(kDark);
+    const auto lit = model->Illuminate(LightSphere(radius,
+                                                   model->PatchSizeMm() / 4,
+                                                   [](Vec3) {
+                                                     return Color{1, 1, 1};
+                                                   }),
+                                       2);
+    for (int c = 0; c < 3; ++c) {
+      double mean = 0;
+      for (int i = 0; i < 100; ++i) {
+        const auto u = static_cast<float>(0.6180340 * i);
+        mean += static_cast<double>(lit->Exitance(
+                    SpherePoint(radius, u, 0.99F - 0.02F * static_cast<float>(i)))[c]) /
+                100;
+      }
+      const double expected =
+          ProfileOf(kDark, c).FluxWithin(2 * static_cast<double>(radius));
+      EXPECT_NEAR(mean, expected, 0.005 * expected) << radius << " mm, channel " << c;
+    }
+  }
+}
+
 TEST(DipoleGather, EnergyIsKeptByPatchesWiderThanTheMeanFreePath) {
   const auto model = MakeDipole(kDark, {.patch_mean_free_paths = 3});
   const PlaneShape plane{.side_mm = 80, .spacing_mm = model->PatchSizeMm() / 3};
