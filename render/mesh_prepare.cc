@@ -117,23 +117,44 @@ Vec3 Upright(Vec3 p, char up) {
   return up == 'z' ? Vec3{p.x, p.z, -p.y} : up == 'x' ? Vec3{-p.y, p.x, p.z} : p;
 }
 
-void Place(TriangleMesh& mesh, double width_mm, char up, MeshPrepareSummary& summary) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  Vec3 low{kInfinity, kInfinity, kInfinity};
-  Vec3 high = -low;
-  for (Vec3& p : mesh.positions) {
-    p = Upright(p, up);
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+struct Bounds {
+  Vec3 low;
+  Vec3 high;
+  explicit Bounds(const std::vector<Vec3>& points) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    low = {kInfinity, kInfinity, kInfinity};
+    high = -low;
+    for (const Vec3 p : points) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
   }
-  const Vec3 size = high - low;
+  Vec3 Size() const { return high - low; }
+};
+
+void Place(TriangleMesh& mesh,
+           const MeshPrepareOptions& options,
+           MeshPrepareSummary& summary) {
+  for (Vec3& p : mesh.positions) {
+    p = Upright(p, options.up[0]);
+  }
+  if (const Vec3 size = Bounds(mesh.positions).Size();
+      options.widest_across && size.z > size.x) {
+    for (Vec3& p : mesh.positions) {
+      p = {p.z, p.y, -p.x};
+    }
+  }
+  const Bounds bounds(mesh.positions);
+  const Vec3 size = bounds.Size();
   if (!(size.x > 1e-6F * std::max(size.y, size.z))) {
     throw BadData("the mesh has no width in x, by which it would be scaled");
   }
-  const float scale = static_cast<float>(width_mm) / size.x;
-  const Vec3 middle = (low + high) * 0.5F;
+  const auto width = static_cast<float>(options.width_mm);
+  const auto highest = static_cast<float>(options.highest);
+  const float scale = width / std::max(size.x, size.y / highest);
+  const Vec3 middle = (bounds.low + bounds.high) * 0.5F;
   for (Vec3& p : mesh.positions) {
-    p = (p - Vec3{middle.x, low.y, middle.z}) * scale;
+    p = (p - Vec3{middle.x, bounds.low.y, middle.z}) * scale;
   }
   summary.size_mm = size * scale;
 }
@@ -232,7 +253,7 @@ MeshPrepareSummary PrepareMesh(TriangleMesh& mesh, const MeshPrepareOptions& opt
       CheckMesh(mesh, "mesh").degenerate_triangles_dropped;
   SelectComponents(mesh, options.largest_component, summary);
   DropUnusedVertices(mesh);
-  Place(mesh, options.width_mm, options.up[0], summary);
+  Place(mesh, options, summary);
   ComputeNormals(mesh);
   summary.area_mm2 = SurfaceArea(mesh);
   ProjectTexture(mesh, options.width_mm);

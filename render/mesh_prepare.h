@@ -11,7 +11,9 @@ namespace nacre::render {
 
 struct MeshPrepareOptions {
   double width_mm = 126;           ///< extent in x, and side of a tile of the texture
+  double highest = 0.75;           ///< in widths; what is higher is made smaller
   std::string up = "y";            ///< the axis that points up in the file
+  bool widest_across = true;       ///< a quarter turn if it is deeper than wide
   bool largest_component = false;  ///< keep only what hangs together and is largest
 
   template <class Self, class Visitor>
@@ -20,6 +22,14 @@ struct MeshPrepareOptions {
           self.width_mm,
           Range{1e-6, 1e6},
           "extent in x, and side of one tile of the texture coordinates, mm");
+    visit("highest",
+          self.highest,
+          Range{1e-3, 1e3},
+          "greatest height in widths; what is higher is made smaller");
+    visit("widest_across",
+          self.widest_across,
+          Range{},
+          "turn by a quarter, about the upright axis, what is deeper than wide");
     visit("up", self.up, Range{}, "the axis that points up in the file: x, y or z");
     visit("largest_component",
           self.largest_component,
@@ -44,7 +54,8 @@ struct MeshPrepareSummary {
 
 /// Makes a scan ready to be given a measured material:
 /// - vertices at the same place become one, faces without area go;
-/// - upright (+y up), `width_mm` wide in x, standing on y = 0, centred in x and z;
+/// - upright (+y up), its wider side along x, `width_mm` wide (less if it would be too
+///   high), standing on y = 0, centred in x and z;
 /// - smooth normals;
 /// - texture coordinates by projection along the axis that a face looks along most, one
 ///   tile for each `width_mm`, never mirrored seen from outside, so that a sample

@@ -140,7 +140,7 @@ TriangleMesh LooseCube(Vec3 offset) {
 
 TEST(PrepareMeshTest, StandsCentredAtItsWidth) {
   TriangleMesh mesh = LooseCube({5, -7, 3});
-  const MeshPrepareSummary summary = PrepareMesh(mesh, {.width_mm = 30});
+  const MeshPrepareSummary summary = PrepareMesh(mesh, {.width_mm = 30, .highest = 5});
   Vec3 low{1e9F, 1e9F, 1e9F};
   Vec3 high = -low;
   for (const Vec3 p : mesh.positions) {
@@ -159,7 +159,7 @@ TEST(PrepareMeshTest, StandsCentredAtItsWidth) {
 
 TEST(PrepareMeshTest, TextureHasTheScaleOfTheObjectAndIsNeverMirrored) {
   TriangleMesh mesh = LooseCube({0, 0, 0});
-  PrepareMesh(mesh, {.width_mm = 30});
+  PrepareMesh(mesh, {.width_mm = 30, .highest = 5});
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const auto& t = mesh.triangles[i];
     for (std::size_t k = 0; k < 3; ++k) {
@@ -184,13 +184,30 @@ TEST(PrepareMeshTest, OtherAxesCanPointUp) {
       p = *up == 'z' ? p * Vec3{1, 1, 3} : p * Vec3{3, 1, 1};
     }
     mesh.normals.clear();
-    const MeshPrepareSummary summary = PrepareMesh(mesh, {.width_mm = 10, .up = up});
+    const MeshPrepareSummary summary =
+        PrepareMesh(mesh, {.width_mm = 10, .highest = 5, .up = up});
     EXPECT_NEAR(summary.size_mm.y, 30, 1e-3) << up;
     for (const auto& t : mesh.triangles) {
       const Vec3 face = Cross(mesh.positions[t[1]] - mesh.positions[t[0]],
                               mesh.positions[t[2]] - mesh.positions[t[0]]);
       EXPECT_GT(Dot(face, mesh.positions[t[0]] - Vec3{0, 15, 0}), 0) << "inside out";
     }
+  }
+}
+
+TEST(PrepareMeshTest, TurnsAndShrinksWhatWouldNotFit) {
+  TriangleMesh mesh = MakeCube();
+  for (Vec3& p : mesh.positions) {
+    p = p * Vec3{1, 4, 2};
+  }
+  const MeshPrepareSummary summary = PrepareMesh(mesh, {.width_mm = 100});
+  EXPECT_NEAR(summary.size_mm.x, 37.5, 1e-3);  // was z: twice as wide as deep
+  EXPECT_NEAR(summary.size_mm.y, 75, 1e-3);
+  EXPECT_NEAR(summary.size_mm.z, 18.75, 1e-3);
+  for (const auto& t : mesh.triangles) {
+    const Vec3 face = Cross(mesh.positions[t[1]] - mesh.positions[t[0]],
+                            mesh.positions[t[2]] - mesh.positions[t[0]]);
+    EXPECT_GT(Dot(face, mesh.positions[t[0]] - Vec3{0, 37.5F, 0}), 0) << "inside out";
   }
 }
 
@@ -202,7 +219,8 @@ TEST(PrepareMeshTest, OnlyTheLargestPartIfAskedFor) {
   TriangleMesh all = mesh;
   EXPECT_EQ(PrepareMesh(all, {}).components, 2);
   EXPECT_EQ(all.triangles.size(), 13u);
-  const MeshPrepareSummary summary = PrepareMesh(mesh, {.largest_component = true});
+  const MeshPrepareSummary summary =
+      PrepareMesh(mesh, {.highest = 1, .largest_component = true});
   EXPECT_EQ(summary.components_dropped, 1);
   EXPECT_EQ(mesh.triangles.size(), 12u);
   EXPECT_NEAR(summary.size_mm.y, 126, 1e-2);  // the dropped part doesn't count
@@ -211,8 +229,10 @@ TEST(PrepareMeshTest, OnlyTheLargestPartIfAskedFor) {
 TEST(PrepareMeshTest, RefusesWhatHasNoWidthAndBadOptions) {
   TriangleMesh flat;
   flat.positions = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  const MeshPrepareOptions unturned{.widest_across = false};
   flat.triangles = {{0, 1, 2}};
-  EXPECT_THAT(MessageOf([&] { PrepareMesh(flat, {}); }), HasSubstr("no width in x"));
+  EXPECT_THAT(MessageOf([&] { PrepareMesh(flat, unturned); }),
+              HasSubstr("no width in x"));
   TriangleMesh cube = MakeCube();
   EXPECT_THAT([&] { PrepareMesh(cube, {.up = "w"}); },
               ThrowsMessage<Error>(HasSubstr("'w' isn't one of x, y and z")));
