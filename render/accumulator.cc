@@ -1,8 +1,17 @@
 #include "render/accumulator.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace nacre::render {
+namespace {
+
+double LuminanceOf(double r, double g, double b) {
+  return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+}
+
+}  // namespace
 
 Accumulator::Accumulator(const Film& film)
     : film_(film),
@@ -26,7 +35,24 @@ bool Accumulator::Add(std::size_t pixel,
   sums.g += g;
   sums.b += b;
   sums.a += w * static_cast<double>(alpha);
+  const double luminance = LuminanceOf(r, g, b);
+  sums.squares += luminance * luminance;
   return true;
+}
+
+double Accumulator::RelativeError(int sample_count) const {
+  double variances = 0;
+  double squares = 0;
+  for (const Sums& sums : sums_) {
+    const double n = static_cast<double>(sample_count - sums.left_out);
+    if (n < 2) {
+      return std::numeric_limits<double>::infinity();
+    }
+    const double mean = LuminanceOf(sums.r, sums.g, sums.b) / n;
+    variances += std::max(0.0, sums.squares / n - mean * mean) / (n - 1);
+    squares += mean * mean;
+  }
+  return squares > 0 ? std::sqrt(variances / squares) : 0;
 }
 
 ExrPart Accumulator::ToImage(int sample_count) const {
@@ -49,8 +75,7 @@ ExrPart Accumulator::ToImage(int sample_count) const {
     const double kept = static_cast<double>(sample_count - sums.left_out);
     const double scale = kept > 0 ? 1 / kept : 0;
     if (luminance) {
-      image.values[i] = static_cast<float>(
-          scale * (0.2126 * sums.r + 0.7152 * sums.g + 0.0722 * sums.b));
+      image.values[i] = static_cast<float>(scale * LuminanceOf(sums.r, sums.g, sums.b));
     } else {
       image.values[i] = static_cast<float>(scale * sums.r);
       image.values[n + i] = static_cast<float>(scale * sums.g);

@@ -7,15 +7,21 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <tbb/task_arena.h>
 
 namespace nacre::render {
 namespace {
 
-void OnEmbreeError(void*, RTCError code, const char* message) {
-  // Only reached while the scene is built: queries can't fail.
-  throw Error(fmt::format("Embree failed to build the scene ({}, code {})",
-                          message != nullptr ? message : "no message",
-                          static_cast<int>(code)));
+// Embree remembers the first error of its device; queries can't fail.
+void CheckEmbree(RTCDevice device, const char* doing) {
+  const RTCError code = rtcGetDeviceError(device);
+  if (code != RTC_ERROR_NONE) {
+    throw Error(fmt::format("Embree failed {}: {}",
+                            doing,
+                            code == RTC_ERROR_OUT_OF_MEMORY
+                                ? "out of memory; use smaller meshes"
+                                : fmt::format("code {}", static_cast<int>(code))));
+  }
 }
 
 // Embree may read 16 bytes from the last vertex on, so it gets a buffer of its own.
@@ -83,14 +89,10 @@ struct EmbreeScene::Handles {
 
 EmbreeScene::EmbreeScene(const std::vector<Shape>& shapes, int thread_count)
     : shapes_(shapes), handles_(std::make_unique<Handles>()) {
-  const std::string configuration =
-      fmt::format("threads={},set_affinity=0", ThreadCount(thread_count));
-  handles_->device = rtcNewDevice(configuration.c_str());
-  if (handles_->device == nullptr) {
-    throw Error(fmt::format("Embree can't start (code {})",
-                            static_cast<int>(rtcGetDeviceError(nullptr))));
-  }
-  rtcSetDeviceErrorFunction(handles_->device, OnEmbreeError, nullptr);
+  // Its "threads=" would limit all of oneTBB, and stay; an arena limits the build
+  // alone.
+  handles_->device = rtcNewDevice(nullptr);
+  CheckEmbree(handles_->device, "to start");
   handles_->scene = rtcNewScene(handles_->device);
   rtcSetSceneFlags(handles_->scene, RTC_SCENE_FLAG_ROBUST);
   rtcSetSceneBuildQuality(handles_->scene, RTC_BUILD_QUALITY_MEDIUM);
@@ -104,7 +106,9 @@ EmbreeScene::EmbreeScene(const std::vector<Shape>& shapes, int thread_count)
     rtcAttachGeometryByID(handles_->scene, geometry, static_cast<unsigned>(i));
     rtcReleaseGeometry(geometry);
   }
-  rtcCommitScene(handles_->scene);
+  tbb::task_arena arena(ThreadCount(thread_count));
+  arena.execute([&] { rtcCommitScene(handles_->scene); });
+  CheckEmbree(handles_->device, "to build the scene");
   if (shapes.empty()) {
     return;
   }

@@ -42,17 +42,8 @@ Placement PlaceOnMesh(const TriangleMesh& mesh, double count) {
   return placement;
 }
 
-// Point i of the plastic sequence, low in discrepancy for any number of points
-// [Roberts18].
-Vec2 PlasticPoint(std::int64_t i) {
-  const double x = 0.5 + 0.7548776662466927 * static_cast<double>(i);
-  const double y = 0.5 + 0.5698402909980532 * static_cast<double>(i);
-  return {std::min(static_cast<float>(x - std::floor(x)), 0x1.fffffep-1F),
-          std::min(static_cast<float>(y - std::floor(y)), 0x1.fffffep-1F)};
-}
-
 SurfaceHit PlacePoint(const Shape& shape, const Placement& placement, std::int64_t i) {
-  const Vec2 u = PlasticPoint(i);
+  const Vec2 u = SobolPoint(static_cast<std::uint32_t>(i));
   if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
     return SpherePoint(shape, sphere->center + SquareToSphere(u) * sphere->radius);
   }
@@ -114,9 +105,7 @@ class Gatherer {
       return {};
     }
     ++counters.shadow_rays;
-    const Ray shadow{
-        OffsetOrigin(hit, sample.wi), sample.wi, 0, sample.distance * 0.9999F};
-    if (world_.geometry().Occluded(shadow)) {
+    if (world_.geometry().Occluded(ShadowRay(hit, sample))) {
       return {};
     }
     return sample.radiance * (cosine * (1 - FresnelDielectric(cosine, eta_)));

@@ -77,7 +77,10 @@ class ObjParser {
   }
 
   float NextFloat() {
-    const std::string_view word = NextWord();
+    std::string_view word = NextWord();
+    if (word.size() > 1 && word[0] == '+' && word[1] != '-') {
+      word.remove_prefix(1);  // from_chars takes no plus
+    }
     float value = 0;
     const auto [stop, failure] =
         std::from_chars(word.data(), word.data() + word.size(), value);

@@ -60,8 +60,11 @@ class PlyNumbers {
       line_number_ += body_[at_] == '\n' ? 1 : 0;
       ++at_;
     }
-    const char* const begin = body_.data() + at_;
     const char* const end = body_.data() + body_.size();
+    if (at_ + 1 < body_.size() && body_[at_] == '+' && body_[at_ + 1] != '-') {
+      ++at_;  // from_chars takes no plus
+    }
+    const char* const begin = body_.data() + at_;
     if (begin == end) {
       Fail("cut off: a number is missing");
     }

@@ -184,6 +184,13 @@ int NextPassEnd(int done, int total) {
   return std::min(total, done + std::clamp(done, 1, kLargest));
 }
 
+int SamplesAtMost(const Scene& scene, const RenderOptions& options) {
+  constexpr int kEnough = 65536;
+  return options.spp > 0            ? options.spp
+         : options.error_target > 0 ? kEnough
+                                    : scene.samples_per_pixel;
+}
+
 class PassSchedule {
  public:
   PassSchedule(const RenderOptions& options, double seconds_before)
@@ -251,10 +258,11 @@ Rendering Render(const Scene& scene,
   Accumulator film(scene.film);
   Pass pass(scene, tracer, options, film);
   PassSchedule schedule(options, total.Seconds());
-  const int spp = options.spp > 0 ? options.spp : scene.samples_per_pixel;
+  const int spp = SamplesAtMost(scene, options);
   int done = 0;
   std::mutex report_mutex;
-  while (done < spp) {
+  while (done < spp && !(options.error_target > 0 &&
+                         film.RelativeError(done) <= options.error_target)) {
     const int end = NextPassEnd(done, spp);
     if (!schedule.TimeLeft(done, end - done)) {
       summary.time_ran_out = true;
@@ -280,6 +288,7 @@ Rendering Render(const Scene& scene,
     }
   }
   summary.samples_per_pixel = done;
+  summary.relative_error = film.RelativeError(done);
   summary.paths_s = schedule.Seconds();
   summary.cpu_s = cpu.Seconds();
   rendering.image = film.ToImage(done);

@@ -49,6 +49,10 @@ std::uint64_t MixSeed(std::uint64_t seed, std::uint64_t index) {
   return Mix(seed + 0x9E3779B97F4A7C15u * (index + 1));
 }
 
+Vec2 SobolPoint(std::uint32_t index) {
+  return {ToUnit(ReverseBits(index)), ToUnit(SecondSobol(index))};
+}
+
 float Sampler::Next1D() {
   const std::uint64_t hash = MixSeed(seed_, dimension_++);
   const auto low = static_cast<std::uint32_t>(hash);

@@ -22,6 +22,9 @@ class Sampler {
   std::uint32_t dimension_ = 0;
 };
 
+/// Point `index` of the (0, 2) sequence itself [Sobol67], not scrambled, in [0, 1)².
+Vec2 SobolPoint(std::uint32_t index);
+
 /// A seed made of a seed and an index (pixel, point, …): neighbours are unrelated.
 std::uint64_t MixSeed(std::uint64_t seed, std::uint64_t index);
 

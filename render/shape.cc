@@ -91,6 +91,10 @@ SurfaceHit MeshPoint(const Shape& shape, std::uint32_t triangle, Vec2 barycentri
   return hit;
 }
 
+float SurfaceOffset(const Sphere& sphere) {
+  return kOffset * (MaxAbs(sphere.center) + sphere.radius);
+}
+
 SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point) {
   const auto& sphere = std::get<Sphere>(shape.geometry);
   const Vec3 outward = Normalized(near_point - sphere.center);
@@ -99,7 +103,7 @@ SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point) {
   hit.position = sphere.center + outward * sphere.radius;
   hit.face_normal = sphere.inward ? -outward : outward;
   hit.normal = hit.face_normal;
-  hit.offset = kOffset * (MaxAbs(sphere.center) + sphere.radius);
+  hit.offset = SurfaceOffset(sphere);
   const Vec3 local = sphere.axes.ToLocal(outward);
   const float longitude = std::atan2(local.y, local.x) / (2 * kPi);
   hit.uv = {longitude < 0 ? longitude + 1 : longitude,

@@ -60,6 +60,9 @@ struct SurfaceHit {
 SurfaceHit MeshPoint(const Shape& shape, std::uint32_t triangle, Vec2 barycentric);
 SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point);
 
+/// SurfaceHit::offset of any point of a sphere.
+float SurfaceOffset(const Sphere& sphere);
+
 /// The hit as models of translucency want it: in millimetres, with tangents along u and
 /// v made orthonormal to the shading normal. Without usable uv, some frame.
 SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit);

@@ -35,6 +35,7 @@ std::string RenderSummary::Table() const {
       "shadow rays      {:>12}\n"
       "exitances        {:>12}\n"
       "evaluations      {:>12}\n"
+      "relative error   {:>12.4f}\n"
       "bad samples      {:>12}\n"
       "clamped samples  {:>12}\n"
       "tree             {:>10.2f} s\n"
@@ -50,6 +51,7 @@ std::string RenderSummary::Table() const {
       shadow_rays,
       exitances,
       evaluations,
+      relative_error,
       bad_samples,
       clamped_samples,
       build_s,
@@ -65,6 +67,7 @@ Json RenderSummary::ToJson() const {
           {"spp", samples_per_pixel},
           {"threads", thread_count_used},
           {"time_ran_out", time_ran_out},
+          {"relative_error", relative_error},
           {"triangles", triangles},
           {"lights", lights},
           {"lit_points", lit_points},

@@ -59,7 +59,8 @@ LightSample SampleSphere(const Sphere& sphere, Color radiance, Vec3 position, Ve
   const float along = Dot(to_center, wi);
   const float inside =
       std::max(0.0F, sphere.radius * sphere.radius - (distance2 - along * along));
-  return {wi, along - std::sqrt(inside), radiance / pdf, pdf, false};
+  return {
+      wi, along - std::sqrt(inside), radiance / pdf, pdf, false, SurfaceOffset(sphere)};
 }
 
 bool SeenAsCone(const Sphere& sphere, Vec3 position) {
@@ -68,6 +69,21 @@ bool SeenAsCone(const Sphere& sphere, Vec3 position) {
 }
 
 }  // namespace
+
+Ray ShadowRay(const SurfaceHit& hit, const LightSample& light) {
+  const Vec3 origin = OffsetOrigin(hit, light.wi);
+  if (std::isinf(light.distance)) {
+    return {origin, light.wi};
+  }
+  // Aimed anew at the point of the light: along light.wi itself, a ray whose origin was
+  // moved would meet a curved light early where it only grazes it.
+  const Vec3 to_light = hit.position + light.wi * light.distance - origin;
+  const float distance = Length(to_light);
+  return {origin,
+          to_light / distance,
+          0,
+          std::max(0.0F, distance * 0.9999F - light.margin)};
+}
 
 World::World(const Scene& scene, int thread_count)
     : scene_(scene),
@@ -186,7 +202,7 @@ LightSample World::SampleEmitter(const Source& source, Vec3 position, Vec2 u) co
     return {};
   }
   const float pdf = distance2 / (cosine * static_cast<float>(source.emitter->area()));
-  return {wi, distance, *shape.radiance / pdf, pdf, false};
+  return {wi, distance, *shape.radiance / pdf, pdf, false, point.offset};
 }
 
 Color World::Emission(const SurfaceHit& hit, Vec3 to_viewer) const {

@@ -17,7 +17,12 @@ struct LightSample {
   Color radiance;      ///< over `pdf`: the estimate of L, or of intensity / distance²
   float pdf = 0;       ///< a steradian; 0: no light from here
   bool delta = false;  ///< nothing but light sampling can find it
+  float margin = 0;    ///< error of a surface's place, in scene units
 };
+
+/// From a hit to a light, ending short of it: of the light's own surface, although both
+/// ends are moved or rounded.
+Ray ShadowRay(const SurfaceHit& hit, const LightSample& light);
 
 /// A scene made ready for questions: what does a ray hit, where does light come from.
 /// Immutable, asked from many threads.

@@ -151,8 +151,7 @@ void PathTracer::AddDirectLight(State& state,
     return;
   }
   ++state.counters.shadow_rays;
-  const Ray shadow{OffsetOrigin(hit, light.wi), light.wi, 0, light.distance * 0.9999F};
-  if (world_.geometry().Occluded(shadow)) {
+  if (world_.geometry().Occluded(ShadowRay(hit, light))) {
     return;
   }
   const float weight = light.delta ? 1 : PowerHeuristic(light.pdf, bsdf.pdf);

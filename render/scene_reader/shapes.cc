@@ -51,14 +51,13 @@ TriangleMesh ReadMesh(Element& element, const std::string& type) {
                       : type == "cube"    ? MakeCube()
                                           : ReadMeshFile(element, type);
   TransformMesh(mesh, to_world);
-  bool inside_out = element.Boolean("flipNormals", false);
   if (to_world.Determinant() < 0) {
     // Mirroring reverses the winding; the normals are right already.
     for (auto& triangle : mesh.triangles) {
       std::swap(triangle[1], triangle[2]);
     }
   }
-  if (inside_out) {
+  if (element.Boolean("flipNormals", false)) {
     TurnInsideOut(mesh);
   }
   const MeshReport report = CheckMesh(mesh, element.document().Where(element.node()));
@@ -102,10 +101,6 @@ BsdfPtr ReadShapeBsdf(Element& element) {
   for (const Element& ref : element.Objects("ref")) {
     found.push_back(
         FindById(element.document(), ref.node(), element.document().bsdfs, "bsdf"));
-  }
-  // Mitsuba also lets a bsdf carry any name.
-  if (element.Has("bsdf")) {
-    element.FailAt("bsdf", "leave out the name of a shape's bsdf");
   }
   if (found.size() > 1) {
     element.Fail("a shape has one bsdf");

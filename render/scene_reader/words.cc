@@ -31,13 +31,20 @@ std::size_t EditDistance(std::string_view a, std::string_view b) {
   return row[b.size()];
 }
 
+bool BeginsWith(std::string_view word, std::string_view start) {
+  return start.size() >= 3 && word.size() > start.size() &&
+         EditDistance(word.substr(0, start.size()), start) == 0;
+}
+
 }  // namespace
 
 std::string NearestWord(std::string_view word, const std::vector<std::string>& known) {
   std::string nearest;
   std::size_t fewest = std::max<std::size_t>(2, word.size() / 2) + 1;
   for (const std::string& candidate : known) {
-    const std::size_t edits = EditDistance(word, candidate);
+    // Half a word is as good as one letter wrong.
+    const bool part = BeginsWith(candidate, word) || BeginsWith(word, candidate);
+    const std::size_t edits = part ? 1 : EditDistance(word, candidate);
     if (edits < fewest) {
       fewest = edits;
       nearest = candidate;

@@ -67,6 +67,19 @@ TEST(AccumulatorTest, LeavesOutWhatIsNotFinite) {
   EXPECT_EQ(image.Channel(1)[1], 2);
 }
 
+TEST(AccumulatorTest, EstimatesTheErrorThatIndependentSamplesLeave) {
+  Film film;
+  film.crop_width = 1;
+  film.crop_height = 1;
+  Accumulator sums(film);
+  EXPECT_TRUE(std::isinf(sums.RelativeError(0)));
+  // 1, 3, 1, 3: mean 2, variance of the mean 4/3 / 4, so relative error √(1/3) / 2.
+  for (const float v : {1.0F, 3.0F, 1.0F, 3.0F}) {
+    sums.Add(0, {v, v, v}, 1, 1);
+  }
+  EXPECT_NEAR(sums.RelativeError(4), std::sqrt(1.0 / 3) / 2, 1e-6);
+}
+
 TEST(AccumulatorTest, WritesTheChannelsOfTheFormat) {
   Film film;
   film.crop_width = 1;

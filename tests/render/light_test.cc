@@ -68,8 +68,7 @@ TEST(LightTest, ConstantLightGivesTheReflectance) {
 
 // The form factor of a parallel disk of radius R at height h over a patch below its
 // centre is R² / (R² + h²) [Howell, catalogue of configuration factors, B-13].
-// Off, because it fails: disk emitters light the floor too little.
-TEST(LightTest, DISABLED_AreaLightHasTheFormFactorOfADisk) {
+TEST(LightTest, AreaLightHasTheFormFactorOfADisk) {
   const std::string light = R"(<shape type="disk">
     <boolean name="flipNormals" value="true"/>
     <transform name="toWorld"><scale value="1.5"/><translate x="5" z="2"/></transform>
@@ -86,8 +85,7 @@ TEST(LightTest, DISABLED_AreaLightHasTheFormFactorOfADisk) {
 }
 
 // Of a sphere with its centre at height h: (R / h)² [Howell, B-43].
-// Off, because it fails: sphere emitters light the floor too little.
-TEST(LightTest, DISABLED_AreaLightHasTheFormFactorOfASphere) {
+TEST(LightTest, AreaLightHasTheFormFactorOfASphere) {
   const std::string light = R"(<shape type="sphere"><float name="radius" value="1"/>
     <point name="center" x="5" y="0" z="3"/>
     <emitter type="area"><rgb name="radiance" value="6"/></emitter></shape>)";
@@ -122,12 +120,12 @@ TEST(LightTest, AnOpaqueThingBetweenGivesShadow) {
   EXPECT_EQ(RadianceAt(light + blocker, "0, 0", 4), 0);
 }
 
-// Off, because it fails: the filter reaches a quarter past the edge.
-TEST(LightTest, DISABLED_LightsAreSeenDirectlyUnlessHidden) {
+TEST(LightTest, LightsAreSeenDirectlyUnlessHidden) {
   const auto corner = [](const std::string& integrator) {
-    const Scene scene = Parse(SceneText(
-        integrator +
-        R"(<shape type="sphere"><emitter type="area"><rgb name="radiance" value="5"/>
+    const Scene scene =
+        Parse(SceneText(integrator +
+                        R"(<shape type="sphere"><float name="radius" value="0.5"/>
+           <emitter type="area"><rgb name="radiance" value="5"/>
            </emitter></shape>
            <emitter type="constant"><rgb name="radiance" value="2"/></emitter>)"));
     RenderOptions options;

@@ -67,8 +67,7 @@ TEST(ObjTest, ASeamSplitsAVertexAndMissingAttributesAreDropped) {
                   .uvs.empty());
 }
 
-// Off, because it fails: the reader refuses numbers with a plus sign.
-TEST(ObjTest, DISABLED_ReadsAcrossLinesOfAnyEnding) {
+TEST(ObjTest, ReadsAcrossLinesOfAnyEnding) {
   EXPECT_EQ(
       ParseObj("v 0 0 0\nv 1e0 -0 +0\nv 1 1 1e-60\nf 1 2 3", "m").triangles.size(), 1u);
 }
@@ -193,6 +192,12 @@ TEST(PlyTest, SaysWhereItIsWrong) {
   EXPECT_THAT(replaced("1 1 7", "1 oops 7"),
               HasSubstr("m.ply:18: 'oops' isn't a number"));
   EXPECT_THAT(replaced("2 -5 -5", "-2 -5 -5"), HasSubstr("negative count"));
+}
+
+TEST(PlyTest, APlusSignIsNoError) {
+  std::string text = AsciiQuad();
+  text.replace(text.find("1 1 7"), 5, "+1 1 +7");
+  EXPECT_EQ(ParsePly(text, "m.ply").positions[2], (Vec3{1, 1, 7}));
 }
 
 TEST(PlyTest, NotANumberIsFoundByTheMeshCheck) {
