@@ -1,0 +1,79 @@
+#pragma once
+
+#include "rigs/transport/diffusion/channel_setup.h"
+#include "rigs/transport/diffusion/multigrid_solver.h"
+#include "rigs/transport/diffusion/pattern_field.h"
+#include "rigs/transport/transport.h"
+
+#include <cstddef>
+#include <vector>
+
+namespace nacre::rigs::diffusion {
+
+/// Columns of one size where beams and windows are, and where they lie in the sample
+/// plane; a margin of growing columns is added around them.
+struct DomainLayout {
+  PointMm lower_left;
+  double step_mm = 1;
+  int count_x = 1;
+  int count_y = 1;
+};
+
+/// A part of the slab cut out around a few beams, and the light of each beam in it.
+template <class Real>
+class LocalDomain {
+ public:
+  LocalDomain(const ChannelSetup& setup, const Mesh& mesh, const PatternFractions&);
+
+  static constexpr std::size_t kLanes = MultigridSolver<Real>::kLanes;
+
+  /// A pencil of `flux` through the column: a source where it first scatters, with the
+  /// coefficients of `substance`, deposited exactly layer by layer.
+  void AddBeam(std::size_t lane,
+               std::size_t column,
+               std::size_t substance,
+               double flux);
+
+  SolveSummary Solve(double tolerance);
+
+  /// Mean over a column of what leaves the top, mm⁻²: the flux, or what the adjoint of
+  /// a beam there collects.
+  double Exitance(std::size_t lane, std::size_t column) const {
+    const Real value = exitance_[column].v[lane];
+    return static_cast<double>(value);
+  }
+  /// Fluxes out of the whole domain; they sum to 1 to the solver's tolerance.
+  struct Budget {
+    double top = 0;
+    double bottom = 0;
+    double sides = 0;  ///< and through a cut bottom: what truncation gets wrong
+    double absorbed = 0;
+  };
+  Budget BudgetOf(std::size_t lane) const;
+
+  /// Exitance as adjoint of the source, see DiffusionOptions::reciprocal_exit.
+  void UseReciprocalExit() { reciprocal_ = true; }
+  std::size_t MemoryBytes() const { return solver_.MemoryBytes(); }
+
+ private:
+  double Deposit(std::size_t substance, std::size_t layer) const;
+
+  const ChannelSetup& setup_;
+  SlabOperator operator_;
+  MultigridSolver<Real> solver_;
+  std::vector<double> depth_edges_mm_;
+  std::vector<float> second_fraction_;
+  std::vector<internal::Lanes<Real>> exitance_;
+  std::vector<Budget> straight_;  // light that never scatters
+  bool reciprocal_ = false;
+};
+
+extern template class LocalDomain<float>;
+extern template class LocalDomain<double>;
+
+/// Mesh of a layout with its margins; `*margin_columns` on each side.
+Mesh MakeMesh(const ChannelSetup& setup,
+              const DomainLayout& layout,
+              int* margin_columns);
+
+}  // namespace nacre::rigs::diffusion

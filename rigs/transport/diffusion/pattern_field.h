@@ -1,0 +1,28 @@
+#pragma once
+
+#include "rigs/pattern.h"
+#include "rigs/transport/diffusion/channel_setup.h"
+#include "rigs/transport/diffusion/mesh.h"
+#include "rigs/transport/diffusion/slab_operator.h"
+
+#include <vector>
+
+namespace nacre::rigs::diffusion {
+
+/// How much of the second medium there is in a mesh's columns and between their
+/// centres. Borders needn't follow the mesh.
+struct PatternFractions {
+  static constexpr int kLines = 8;  // across each column
+  std::vector<float> column;        ///< nx · ny, by area
+  std::vector<float> east;  ///< nx · ny · kLines, between centres, line by line
+  std::vector<float> north;
+};
+
+PatternFractions SampleFractions(const Pattern& pattern, const Mesh& mesh);
+
+/// σ_a and the vertical D are means by area. Between two centres D is the harmonic mean
+/// along each of kLines parallel lines (layers in series) and the mean of the lines (in
+/// parallel): of second order for borders along the mesh, wherever they are.
+LateralField MakeField(const PatternFractions& fractions, const ChannelSetup& setup);
+
+}  // namespace nacre::rigs::diffusion
