@@ -1,0 +1,1 @@
+// Empty: its target holds the headers that all tests share, precompiled.
