@@ -2,19 +2,12 @@
 
 #include "acquire/illuminator.h"
 #include "core/json_fwd.h"
+#include "core/point_mm.h"
 
 #include <array>
 #include <string>
 
 namespace nacre::acquire {
-
-/// A position in the sample plane: millimetres, origin at the sample's centre, +x
-/// right, +y up.
-struct PointMm {
-  double x = 0;
-  double y = 0;
-  friend bool operator==(const PointMm&, const PointMm&) = default;
-};
 
 /// A cubic polynomial of two variables; the coefficients belong to the monomials
 /// 1, u, v, u², uv, v², u³, u²v, uv², v³.

@@ -9,8 +9,6 @@
 
 namespace nacre::calibrate {
 
-using acquire::PointMm;
-
 /// A position in a picture: pixels, +x right, +y down, the centre of the upper left
 /// pixel is (0, 0).
 struct PixelPoint {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "core/point_mm.h"
+
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -8,12 +10,6 @@
 #include <vector>
 
 namespace nacre::reconstruct {
-
-/// A position or offset in the sample plane: millimetres, +x right, +y up.
-struct PointMm {
-  double x = 0;
-  double y = 0;
-};
 
 /// What a dataset R_d(x_i, d) is sampled on. Grid indices and window indices run as in
 /// a picture: i (and u) to the right, j (and v) downwards, so that (0, 0) is the upper

@@ -7,7 +7,7 @@
 
 namespace nacre::rigs {
 
-using acquire::PointMm;
+using nacre::PointMm;
 
 /// How two media share the sample plane; the same at every depth, laterally infinite.
 enum class PatternType {

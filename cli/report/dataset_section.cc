@@ -120,7 +120,7 @@ std::string SliceFigure(const DatasetDigest& d) {
       "repeat({},1fr)\">\n<span></span>",
       d.samples.size());
   for (std::size_t n = 0; n < d.samples.size(); ++n) {
-    const reconstruct::PointMm p = d.header.GridPoint(d.samples[n].i, d.samples[n].j);
+    const PointMm p = d.header.GridPoint(d.samples[n].i, d.samples[n].j);
     grid +=
         fmt::format("<span>{}: ({}, {}) mm</span>", n + 1, Number(p.x), Number(p.y));
   }

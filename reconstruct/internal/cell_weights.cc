@@ -125,10 +125,8 @@ class WeightBox {
 double StepMm(const calibrate::CameraGeometry& camera, double dx, double dy) {
   const calibrate::PixelPoint centre{0.5 * (camera.width_px - 1),
                                      0.5 * (camera.height_px - 1)};
-  const calibrate::PointMm a =
-      camera.SampleFromPixel({centre.x - 0.5 * dx, centre.y - 0.5 * dy});
-  const calibrate::PointMm b =
-      camera.SampleFromPixel({centre.x + 0.5 * dx, centre.y + 0.5 * dy});
+  const PointMm a = camera.SampleFromPixel({centre.x - 0.5 * dx, centre.y - 0.5 * dy});
+  const PointMm b = camera.SampleFromPixel({centre.x + 0.5 * dx, centre.y + 0.5 * dy});
   return std::hypot(b.x - a.x, b.y - a.y);
 }
 

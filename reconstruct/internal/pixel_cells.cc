@@ -19,7 +19,7 @@ Corners CornersAbove(const CellLattice& lattice,
   Corners corners;
   corners.reserve(static_cast<std::size_t>(camera.width_px) + 1);
   for (int column = 0; column <= camera.width_px; ++column) {
-    const calibrate::PointMm p = camera.SampleFromPixel({column - 0.5, row - 0.5});
+    const PointMm p = camera.SampleFromPixel({column - 0.5, row - 0.5});
     corners.push_back({(p.x - lattice.corner_mm.x) / lattice.pitch_mm,
                        (lattice.corner_mm.y - p.y) / lattice.pitch_mm});
   }

@@ -9,8 +9,6 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
-using acquire::PointMm;
-
 // A disc of pixels around a spot: wide enough for the tails of a spot of one or two
 // pixels, narrow enough that the dark level's error weighs nothing.
 constexpr int kReachPx = 6;

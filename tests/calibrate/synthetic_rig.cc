@@ -11,7 +11,6 @@
 namespace nacre::testing {
 namespace {
 
-using acquire::PointMm;
 using acquire::Target;
 
 constexpr int kSubPixels = 3;  // along each axis

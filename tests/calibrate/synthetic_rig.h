@@ -40,7 +40,7 @@ struct SyntheticTruth {
   bool no_board = false;     ///< somebody forgot to put it there
 
   /// A scanner with pincushion, offset, rotation and unequal scales.
-  acquire::PointMm LaserAt(acquire::ScanAngle angle) const;
+  PointMm LaserAt(acquire::ScanAngle angle) const;
 };
 
 /// A rig.toml that suits the default truth, with some texts replaced by others.
@@ -54,7 +54,7 @@ void CaptureSynthetic(const SyntheticTruth& truth,
                       const std::filesystem::path& folder);
 
 /// Where OpenCV says that a point of the sample plane is seen.
-cv::Point2d TruePixel(const SyntheticTruth& truth, acquire::PointMm point);
+cv::Point2d TruePixel(const SyntheticTruth& truth, PointMm point);
 
 /// The camera's centre in sample coordinates, mm.
 cv::Vec3d TrueCameraCentre(const SyntheticTruth& truth);

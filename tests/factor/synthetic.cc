@@ -9,7 +9,6 @@
 namespace nacre::testing {
 namespace {
 
-using reconstruct::PointMm;
 using reconstruct::RdDataset;
 using reconstruct::RdHeader;
 

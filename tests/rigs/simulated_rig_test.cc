@@ -224,7 +224,7 @@ TEST(ShippedRigs, SeeAllTheyMust) {
       std::vector<ScanAngle> spots;
       for (int j = spacing / 4; j < description.grid.points_y; j += spacing) {
         for (int i = spacing / 4; i < description.grid.points_x; i += spacing) {
-          const acquire::PointMm p = description.grid.Point(i, j);
+          const PointMm p = description.grid.Point(i, j);
           spots.push_back({p.x * rad, p.y * rad});
         }
       }
