@@ -220,6 +220,11 @@ std::vector<TomlTable> TomlTable::Tables(const std::string& key) const {
   return tables;
 }
 
+bool TomlTable::HasTables(const std::string& key) const {
+  const toml::node* const node = node_->Find(key);
+  return node != nullptr && node->is_array_of_tables();
+}
+
 void TomlTable::RejectUnknownKeys() const {
   for (const auto& [key, value] : *node_->table) {
     const std::string name(key.str());

@@ -41,6 +41,8 @@ class TomlTable {
   std::optional<TomlTable> FindTable(const std::string& key) const;
   /// An array of tables ([[key]]), empty if there is none.
   std::vector<TomlTable> Tables(const std::string& key) const;
+  /// Whether there are some, for keys that may hold something shorter too.
+  bool HasTables(const std::string& key) const;
 
   /// Throws BadData naming the first key of this table that no getter was asked for.
   void RejectUnknownKeys() const;

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "rigs/internal/simd.h"
+#include "rigs/pattern_mixture.h"
 
 #include <algorithm>
 #include <cmath>
@@ -142,6 +143,8 @@ const char* Name(PatternType type) {
       return "chessboard";
     case PatternType::kStripes:
       return "stripes";
+    case PatternType::kMixture:
+      return "mixture";
   }
   throw LogicError("a pattern of no type");
 }
@@ -157,6 +160,8 @@ int Pattern::MediumAt(PointMm point) const {
       return parity(point.x) ^ parity(point.y);
     case PatternType::kStripes:
       return parity(point.x);
+    case PatternType::kMixture:
+      return mixture->At(point) >= 0.5 ? 1 : 0;
   }
   throw LogicError("a pattern of no type");
 }
@@ -166,6 +171,10 @@ void Pattern::SecondMediumFraction(PointMm from,
                                    float* fraction) const {
   if (type == PatternType::kHomogeneous) {
     std::fill_n(fraction, to.count, 0.0F);
+    return;
+  }
+  if (type == PatternType::kMixture) {
+    mixture->SegmentFractions(from, to, fraction);
     return;
   }
   const Segment segment{static_cast<float>(from.x / cell_mm),

@@ -2,6 +2,8 @@
 
 #include "core/error.h"
 #include "core/toml.h"
+#include "rigs/phantom_media.h"
+#include "rigs/phantom_structure.h"
 
 #include <algorithm>
 #include <array>
@@ -9,14 +11,15 @@
 #include <fmt/format.h>
 #include <limits>
 #include <numbers>
-#include <set>
+#include <optional>
 #include <span>
 
 namespace nacre::rigs {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kPerMmMax = 1e6;
+constexpr Range kThicknessMm{1e-6, kInfinity};
+constexpr Range kEta{1, 4};
 
 // The enumerator whose Name() the file gives, or an error that lists them all.
 template <class Enum>
@@ -34,87 +37,127 @@ Enum Choose(const TomlTable& table,
   throw table.At(key, fmt::format("'{}' is not known; known are: {}", text, known));
 }
 
-Slab ReadSlab(const TomlTable& table) {
+// What [slab] says; layers may know their thickness and η themselves.
+struct SlabText {
+  std::optional<double> thickness_mm;
+  std::optional<double> eta;
+  Bottom bottom = Bottom::kAir;
+};
+
+SlabText ReadSlab(const TomlTable& table, bool is_layered, bool is_skin) {
   constexpr std::array kBottoms = {
       Bottom::kAir, Bottom::kMatched, Bottom::kBlack, Bottom::kWhite};
-  Slab slab;
-  slab.thickness_mm = table.Number("thickness_mm", Range{1e-6, kInfinity});
-  slab.eta = table.Number("eta", Range{1, 4});
+  SlabText slab;
+  if (!is_layered || table.Has("thickness_mm")) {
+    slab.thickness_mm = table.Number("thickness_mm", kThicknessMm);
+  }
+  if (!is_skin && table.Has("eta")) {
+    slab.eta = table.Number("eta", kEta);
+  }
   slab.bottom = Choose<Bottom>(table, "bottom", table.Text("bottom", "air"), kBottoms);
   table.RejectUnknownKeys();
   return slab;
 }
 
-// A list with a value a channel; one value stands for all channels.
-std::vector<double> PerChannel(const TomlTable& table,
-                               const std::string& key,
-                               std::vector<double> values,
-                               std::size_t channels) {
-  if (values.size() == 1) {
-    values.resize(channels, values.front());
+std::size_t MediumOf(const TomlTable& layer, const std::vector<Medium>& media) {
+  const std::string name = layer.Text("medium");
+  const auto at = std::find_if(
+      media.begin(), media.end(), [&](const Medium& m) { return m.name == name; });
+  if (at == media.end()) {
+    throw layer.At("medium",
+                   fmt::format("'{}' is not the name of one of the media", name));
   }
-  if (values.size() != channels) {
-    throw table.At(key,
-                   fmt::format("{} values for {} channels", values.size(), channels));
-  }
-  return values;
+  return static_cast<std::size_t>(at - media.begin());
 }
 
-Medium ReadMedium(const TomlTable& table, std::size_t channels) {
-  constexpr double kMostForward = 0.999;
-  Medium medium;
-  medium.name = table.Text("name", "");
-  const Range coefficient{0, kPerMmMax};
-  const auto read = [&](const std::string& key, std::vector<double> values) {
-    return PerChannel(table, key, std::move(values), channels);
-  };
-  medium.sigma_a_per_mm =
-      read("sigma_a_per_mm", table.Numbers("sigma_a_per_mm", coefficient));
-  medium.sigma_s_per_mm =
-      read("sigma_s_per_mm", table.Numbers("sigma_s_per_mm", coefficient));
-  medium.g = read("g", table.Numbers("g", {0.0}, Range{-kMostForward, kMostForward}));
-  table.RejectUnknownKeys();
-  return medium;
-}
-
-// As the file names them, else R, G, B for three and c1, c2, … for other counts, which
-// is that of the first medium's longest list.
-std::vector<std::string> ReadChannels(const TomlTable& root,
-                                      const std::vector<TomlTable>& media) {
-  std::vector<std::string> channels = root.Texts("channels", {});
-  if (root.Has("channels")) {
-    const std::set<std::string> distinct(channels.begin(), channels.end());
-    if (channels.empty() || distinct.size() != channels.size() ||
-        distinct.contains("")) {
-      throw root.At("channels", "expected different, non-empty names");
+// [[layer]], from the top. The last one's thickness may be what is left of the slab.
+std::vector<SlabLayer> ReadLayers(const TomlTable& root,
+                                  const SlabText& slab,
+                                  const PhantomMedia& substances) {
+  constexpr std::size_t kMostLayers = 1000;
+  const std::vector<TomlTable> tables = root.Tables("layer");
+  if (tables.empty() || tables.size() > kMostLayers) {
+    throw root.At("layer",
+                  fmt::format("{} given; 1 to {} can be", tables.size(), kMostLayers));
+  }
+  std::vector<SlabLayer> layers;
+  double depth_mm = 0;
+  for (const TomlTable& table : tables) {
+    SlabLayer layer{.medium = MediumOf(table, substances.media)};
+    layer.eta = slab.eta && !table.Has("eta") ? *slab.eta : table.Number("eta", kEta);
+    const bool is_last = layers.size() + 1 == tables.size();
+    if (is_last && slab.thickness_mm && !table.Has("thickness_mm")) {
+      layer.thickness_mm = *slab.thickness_mm - depth_mm;
+    } else {
+      layer.thickness_mm = table.Number("thickness_mm", kThicknessMm);
     }
-    return channels;
+    if (!(layer.thickness_mm > 0) || (std::isinf(layer.thickness_mm) && !is_last)) {
+      throw table.At(
+          "thickness_mm",
+          fmt::format(
+              "{} mm for the layer below {} mm; it must be above 0, and only the "
+              "last one's may be infinite",
+              layer.thickness_mm,
+              depth_mm));
+    }
+    table.RejectUnknownKeys();
+    depth_mm += layer.thickness_mm;
+    layers.push_back(layer);
   }
-  std::size_t count = 1;
-  for (const TomlTable& medium : media) {
-    count = std::max({count,
-                      medium.Numbers("sigma_a_per_mm").size(),
-                      medium.Numbers("sigma_s_per_mm").size()});
+  if (slab.thickness_mm && depth_mm != *slab.thickness_mm &&
+      !(std::abs(depth_mm - *slab.thickness_mm) <= 1e-9 * depth_mm)) {
+    throw root.At("layer",
+                  fmt::format("the layers are {} mm thick together, but "
+                              "slab.thickness_mm is {}; leave one of them out",
+                              depth_mm,
+                              *slab.thickness_mm));
   }
-  if (count == 3) {
-    return {"R", "G", "B"};
-  }
-  for (std::size_t c = 0; c < count; ++c) {
-    channels.push_back(fmt::format("c{}", c + 1));
-  }
-  return channels;
+  return layers;
 }
 
-Pattern ReadPattern(const TomlTable& table) {
-  constexpr std::array kTypes = {
-      PatternType::kHomogeneous, PatternType::kChessboard, PatternType::kStripes};
-  Pattern pattern;
-  pattern.type = Choose<PatternType>(table, "type", table.Text("type"), kTypes);
-  if (pattern.type != PatternType::kHomogeneous) {
-    pattern.cell_mm = table.Number("cell_mm", Range{1e-3, 1e6});
+std::vector<SlabLayer> SkinLayers(const TomlTable& root,
+                                  const SlabText& slab,
+                                  std::vector<SlabLayer> layers) {
+  if (slab.thickness_mm) {
+    layers.back().thickness_mm = *slab.thickness_mm - layers.front().thickness_mm;
   }
-  table.RejectUnknownKeys();
-  return pattern;
+  if (!(layers.back().thickness_mm > 0)) {
+    throw root.At(
+        "skin",
+        fmt::format("slab.thickness_mm is {}, which leaves no dermis under {} "
+                    "mm of epidermis",
+                    *slab.thickness_mm,
+                    layers.front().thickness_mm));
+  }
+  return layers;
+}
+
+void SetSlab(const TomlTable& root, const PhantomMedia& substances, Phantom& phantom) {
+  const bool is_skin = !substances.layers.empty();
+  if (is_skin && root.Has("layer")) {
+    throw root.At("layer", "given beside [skin], which has layers of its own");
+  }
+  const bool is_layered = is_skin || root.Has("layer");
+  const TomlTable table = root.Table("slab");
+  SlabText slab = ReadSlab(table, is_layered, is_skin);
+  if (!slab.eta) {
+    slab.eta = substances.eta;
+  }
+  if (is_skin) {
+    phantom.layers = SkinLayers(root, slab, substances.layers);
+  } else if (is_layered) {
+    phantom.layers = ReadLayers(root, slab, substances);
+  }
+  phantom.slab.bottom = slab.bottom;
+  if (!is_layered) {
+    phantom.slab.thickness_mm = *slab.thickness_mm;
+    phantom.slab.eta = slab.eta ? *slab.eta : table.Number("eta", kEta);
+    return;
+  }
+  phantom.slab.eta = phantom.layers.front().eta;
+  for (const SlabLayer& layer : phantom.layers) {
+    phantom.slab.thickness_mm += layer.thickness_mm;
+  }
 }
 
 Beam ReadBeam(const TomlTable& table) {
@@ -154,33 +197,50 @@ acquire::GridDescription ReadGrid(const TomlTable& table) {
   return grid;
 }
 
-Phantom FromTable(const TomlTable& root) {
-  Phantom phantom;
-  phantom.slab = ReadSlab(root.Table("slab"));
-  const std::vector<TomlTable> media = root.Tables("medium");
-  if (media.empty()) {
-    throw root.At("medium", "missing: what the slab is made of, [[medium]]");
+// That the media are as many as their arrangement is made of, and in one arrangement.
+void CheckArrangement(const TomlTable& root, const Phantom& phantom) {
+  const bool patterned =
+      phantom.voxels != nullptr || phantom.pattern.type != PatternType::kHomogeneous;
+  if (!phantom.layers.empty()) {
+    if (patterned) {
+      throw root.At("pattern",
+                    "given for a slab of layers, each of which is of one medium; write "
+                    "such a slab as voxels");
+    }
+    return;
   }
-  phantom.channels = ReadChannels(root, media);
-  for (const TomlTable& medium : media) {
-    phantom.media.push_back(ReadMedium(medium, phantom.channels.size()));
+  const auto pattern = root.FindTable("pattern");
+  if (pattern && pattern->Text("type") == "layers") {
+    throw pattern->At("type", "'layers' given, but there is no [[layer]]");
   }
-  if (const auto pattern = root.FindTable("pattern")) {
-    phantom.pattern = ReadPattern(*pattern);
-  }
-  if (static_cast<int>(phantom.media.size()) != phantom.pattern.MediumCount()) {
+  if (phantom.voxels == nullptr &&
+      static_cast<int>(phantom.media.size()) != phantom.pattern.MediumCount()) {
     throw root.At("medium",
                   fmt::format("{} given, but the pattern '{}' is made of {}",
                               phantom.media.size(),
                               Name(phantom.pattern.type),
                               phantom.pattern.MediumCount()));
   }
+}
+
+Phantom FromTable(const TomlTable& root) {
+  const PhantomMedia substances = ReadPhantomMedia(root);
+  Phantom phantom;
+  phantom.channels = substances.channels;
+  phantom.media = substances.media;
+  SetSlab(root, substances, phantom);
   if (const auto beam = root.FindTable("beam")) {
     phantom.beam = ReadBeam(*beam);
   }
   if (const auto grid = root.FindTable("grid")) {
     phantom.grid = ReadGrid(*grid);
   }
+  if (const auto pattern = root.FindTable("pattern")) {
+    Structure structure = ReadStructure(*pattern, phantom);
+    phantom.pattern = std::move(structure.pattern);
+    phantom.voxels = std::move(structure.voxels);
+  }
+  CheckArrangement(root, phantom);
   root.RejectUnknownKeys();
   return phantom;
 }
@@ -213,6 +273,17 @@ const char* Name(BeamShape shape) {
       return "gaussian";
   }
   throw LogicError("a beam of no shape");
+}
+
+void RequirePlanePattern(const Phantom& phantom, const std::string& solver) {
+  const char* const what = !phantom.layers.empty()     ? "a slab of layers"
+                           : phantom.voxels != nullptr ? "media that change with depth "
+                                                         "or are more than two (voxels)"
+                                                       : nullptr;
+  if (what != nullptr) {
+    throw BadData(solver + " can't do " + what +
+                  ": use Monte Carlo, --solver mc, which can");
+  }
 }
 
 Phantom ReadPhantom(const std::filesystem::path& path) {

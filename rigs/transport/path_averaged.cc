@@ -46,6 +46,7 @@ double Reflectance(const DiffusionMedium& medium,
 }
 
 void CheckPhantom(const Phantom& phantom) {
+  RequirePlanePattern(phantom, "the fast solver");
   const auto refuse = [](const std::string& what) {
     throw BadData("the fast solver is a diffusion model and can't do this: " + what);
   };

@@ -93,7 +93,7 @@ Place StripePlace(PointMm point, double cell_mm, double blind_mm) {
   return place;
 }
 
-Place PlaceOf(const Pattern& pattern, PointMm point, double blind_mm) {
+Place PlaceOf(const Pattern& pattern, PointMm point, long index, double blind_mm) {
   switch (pattern.type) {
     case PatternType::kHomogeneous:
       return {};
@@ -101,6 +101,8 @@ Place PlaceOf(const Pattern& pattern, PointMm point, double blind_mm) {
       return ChessboardPlace(point, pattern.cell_mm, blind_mm);
     case PatternType::kStripes:
       return StripePlace(point, pattern.cell_mm, blind_mm);
+    case PatternType::kMixture:
+      return {.key = {index, 0, 0}, .from_canonical = {}};  // no symmetry is known
   }
   throw LogicError("a pattern of no type");
 }
@@ -136,7 +138,8 @@ DistinctPoints FindDistinctPoints(const Pattern& pattern,
   for (int j = 0; j < grid.points_y; ++j) {
     for (int i = 0; i < grid.points_x; ++i) {
       const PointMm point = grid.Point(i, j);
-      const Place place = PlaceOf(pattern, point, blind_mm);
+      const auto index = static_cast<long>(distinct.of.size());
+      const Place place = PlaceOf(pattern, point, index, blind_mm);
       const auto [at, is_new] =
           seen.try_emplace(place.key,
                            First{static_cast<std::uint32_t>(distinct.points.size()),

@@ -29,7 +29,8 @@ struct DistinctPoints {
 
 /// Positions are compared to 1e-6 of a cell. Chessboard: shifts by two cells along an
 /// axis or one along both, mirrors about a cell's middle, transposition; stripes:
-/// shifts along y, by two stripes along x, mirrors; homogeneous: one point is all.
+/// shifts along y, by two stripes along x, mirrors; homogeneous: one point is all;
+/// mixtures: every point is distinct.
 ///
 /// `blind_mm`: a border farther than that from x_i along an axis is taken not to matter
 /// (not to exist, if nothing beyond it is simulated). Infinity: exact symmetries only.

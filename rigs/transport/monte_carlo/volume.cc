@@ -150,17 +150,4 @@ void Validate(const Volume& volume) {
   }
 }
 
-Volume MakeVolume(const Phantom& phantom, std::size_t channel) {
-  Volume volume;
-  for (const Medium& medium : phantom.media) {
-    volume.media.push_back({medium.sigma_a_per_mm[channel],
-                            medium.sigma_s_per_mm[channel],
-                            medium.g[channel]});
-  }
-  volume.layers = {{phantom.slab.thickness_mm, phantom.slab.eta, 0}};
-  volume.pattern = phantom.pattern;
-  volume.bottom = phantom.slab.bottom;
-  return volume;
-}
-
 }  // namespace nacre::rigs::monte_carlo
