@@ -38,6 +38,9 @@ struct Pattern {
   /// How many media the pattern is made of.
   int MediumCount() const { return type == PatternType::kHomogeneous ? 1 : 2; }
 
+  /// Whether every point is in one medium or the other.
+  bool IsPure() const { return type != PatternType::kMixture; }
+
   /// 0 or 1: the medium at a point, of a mixture the one there is more of. A cell owns
   /// its left and lower edges.
   int MediumAt(PointMm point) const;
