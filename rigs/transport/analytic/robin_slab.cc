@@ -106,9 +106,11 @@ double RobinSlab::ThickReflectance(double r_mm) const {
   const double gap = sigma_t - q;
   const auto line = [&](double u) {
     const double x = gap * u;
+    // The slower exponential in front, so that nothing overflows.
+    const double slow = std::exp(-std::min(q, sigma_t) * u);
     const double density = std::abs(x) < 1e-6
-                               ? u * std::exp(-q * u) * (1 - 0.5 * x)
-                               : -std::exp(-q * u) * std::expm1(-x) / gap;
+                               ? u * slow * (1 - 0.5 * std::abs(x))
+                               : -slow * std::expm1(-std::abs(x)) / std::abs(gap);
     return density == 0 ? 0.0 : density * 2 * SourceExitance(u, r_mm * r_mm, sigma_tr_);
   };
   return setup_.medium.sigma_s_prime_per_mm * q *

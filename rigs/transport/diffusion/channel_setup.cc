@@ -28,6 +28,11 @@ double BottomFactor(const Slab& slab, double top_factor) {
 
 }  // namespace
 
+std::span<const Medium> PatternMedia(const Phantom& phantom) {
+  return std::span(phantom.media)
+      .first(static_cast<std::size_t>(phantom.pattern.MediumCount()));
+}
+
 ChannelSetup MakeChannelSetup(const Phantom& phantom,
                               std::size_t channel,
                               const DiffusionOptions& options,
@@ -42,7 +47,7 @@ ChannelSetup MakeChannelSetup(const Phantom& phantom,
   setup.shortest_free_path_mm = kInfinity;
   double slowest = kInfinity;
   double diffusion_mm = 0;
-  for (const Medium& medium : phantom.media) {
+  for (const Medium& medium : PatternMedia(phantom)) {
     ChannelSetup::Substance s;
     s.medium = {medium.sigma_a_per_mm[channel], medium.ReducedScattering(channel)};
     if (!(s.medium.SigmaTPrime() > 0)) {

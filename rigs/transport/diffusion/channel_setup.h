@@ -7,6 +7,7 @@
 #include "rigs/transport/diffusion/slab_operator.h"
 
 #include <cstddef>
+#include <span>
 #include <vector>
 
 namespace nacre::rigs::diffusion {
@@ -30,6 +31,9 @@ struct ChannelSetup {
   double shortest_free_path_mm = 0;
   DepthLayout depth;
 };
+
+/// The media that the pattern is made of.
+std::span<const Medium> PatternMedia(const Phantom& phantom);
 
 /// `half_window_mm` is how far from the beam results are wanted. Throws BadData for a
 /// medium that neither scatters nor absorbs.

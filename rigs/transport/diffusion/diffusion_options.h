@@ -2,6 +2,8 @@
 
 #include "core/options.h"
 
+#include <cstdint>
+
 namespace nacre::rigs {
 
 struct DiffusionOptions {
@@ -10,6 +12,8 @@ struct DiffusionOptions {
   double first_layer_free_paths = 0.2;
   double layer_growth = 1.25;
   double tolerance = 1e-6;
+  std::int64_t reference_photons = 4'000'000;
+  std::int64_t reference_seed = 1;
   bool classical_coefficient = false;
   bool reciprocal_exit = false;
   int thread_count = 0;
@@ -30,6 +34,11 @@ struct DiffusionOptions {
           "thickness of the first layer");
     visit("layer_growth", self.layer_growth, Range{1, 2}, "of a layer to the next");
     visit("tolerance", self.tolerance, Range{1e-12, 0.1}, "relative residual");
+    visit("reference_photons",
+          self.reference_photons,
+          Range{0, 1e12},
+          "for the Monte Carlo profile of each medium and channel; 0: pure diffusion");
+    visit("reference_seed", self.reference_seed, Range{0}, "of those photons");
     visit("classical_coefficient",
           self.classical_coefficient,
           Range{},

@@ -2,12 +2,15 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "rigs/pattern_mixture.h"
 #include "rigs/transport/diffusion/internal/diffusion_state.h"
+#include "rigs/transport/diffusion/monte_carlo_profile.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <mutex>
 #include <utility>
 #include <vector>
@@ -30,7 +33,7 @@ int OddAtLeast(double value) {
 
 double ShortestFreePathMm(const Phantom& phantom, std::size_t channel) {
   double shortest = std::numeric_limits<double>::infinity();
-  for (const Medium& medium : phantom.media) {
+  for (const Medium& medium : diffusion::PatternMedia(phantom)) {
     shortest = std::min(
         shortest,
         1 / (medium.sigma_a_per_mm[channel] + medium.ReducedScattering(channel)));
@@ -53,14 +56,25 @@ DiffusionTransport::Channel DiffusionTransport::Impl::MakeChannel(
   const double last_mm =
       2 * (half_window_mm + setup.margin_mm + 10 * setup.shortest_free_path_mm);
   for (std::size_t m = 0; m < setup.substances.size(); ++m) {
-    const RobinSlab exact(setup.substances[m].slab);
+    std::function<double(double)> profile;
+    if (reference) {
+      profile = [&](double r_mm) { return reference(m, c, r_mm); };
+    } else if (options.reference_photons > 0) {
+      profile = diffusion::MonteCarloProfile(phantom,
+                                             {.medium = m,
+                                              .channel = c,
+                                              .last_mm = last_mm,
+                                              .photon_count = options.reference_photons,
+                                              .seed = options.reference_seed,
+                                              .thread_count = options.thread_count},
+                                             RobinSlab(setup.substances[m].slab));
+    } else {
+      profile = [exact = RobinSlab(setup.substances[m].slab)](double r_mm) {
+        return exact.Reflectance(r_mm);
+      };
+    }
     channel.profiles.emplace_back(
-        [&](double r_mm) {
-          return reference ? reference(m, c, r_mm) : exact.Reflectance(r_mm);
-        },
-        1e-4 * setup.shortest_free_path_mm,
-        last_mm,
-        options.thread_count);
+        profile, 1e-4 * setup.shortest_free_path_mm, last_mm, options.thread_count);
     channel.reach_mm =
         std::max(channel.reach_mm,
                  channel.profiles.back().Reach(1e-4) + 0.5 * phantom.beam.width_mm);
@@ -69,7 +83,7 @@ DiffusionTransport::Channel DiffusionTransport::Impl::MakeChannel(
       setup,
       NearField::Request{.step_mm = channel.step_mm,
                          .half_columns = (core * channel.refine - 1) / 2,
-                         .reciprocal_exit = options.reciprocal_exit,
+                         .from_depth = FromDepth(),
                          .tolerance = std::min(options.tolerance, 1e-8)},
       channel.beam,
       channel.profiles);
@@ -157,24 +171,24 @@ void DiffusionTransport::Impl::AddBeam(const Channel& channel,
                                        LocalDomain<Real>& domain) const {
   const auto centre =
       static_cast<std::ptrdiff_t>(CentreColumn(channel, scene, place, x_i));
-  // Points of one column and medium follow each other often: deposit them together.
-  std::size_t column = 0;
-  std::size_t medium = 0;
-  double flux = 0;
+  std::map<std::size_t, std::array<double, 2>> flux;  // by column and medium
   for (const BeamPoint& point : channel.beam) {
-    const std::size_t at = static_cast<std::size_t>(
-        centre + std::ptrdiff_t{point.column_y} * scene.nx + point.column_x);
-    const auto here = static_cast<std::size_t>(phantom.pattern.MediumAt(
-        {x_i.x + point.offset_mm.x, x_i.y + point.offset_mm.y}));
-    if (flux > 0 && (at != column || here != medium)) {
-      domain.AddBeam(lane, column, medium, flux);
-      flux = 0;
-    }
-    column = at;
-    medium = here;
-    flux += point.weight;
+    const PointMm at{x_i.x + point.offset_mm.x, x_i.y + point.offset_mm.y};
+    const double second = phantom.pattern.type == PatternType::kMixture
+                              ? phantom.pattern.mixture->At(at)
+                              : phantom.pattern.MediumAt(at);
+    auto& [in_first, in_second] = flux[static_cast<std::size_t>(
+        centre + std::ptrdiff_t{point.column_y} * scene.nx + point.column_x)];
+    in_first += point.weight * (1 - second);
+    in_second += point.weight * second;
   }
-  domain.AddBeam(lane, column, medium, flux);
+  for (const auto& [column, parts] : flux) {
+    for (std::size_t medium = 0; medium < parts.size(); ++medium) {
+      if (parts[medium] > 0) {
+        domain.AddBeam(lane, column, medium, parts[medium]);
+      }
+    }
+  }
 }
 
 // The other file needs both.
@@ -245,9 +259,7 @@ std::vector<Window> DiffusionTransport::Impl::Solve(const Neighbourhood& place) 
     const Channel& channel = channels[c];
     const Scene scene = MakeScene(channel, place);
     LocalDomain<float> domain(channel.setup, scene.mesh, scene.fractions);
-    if (options.reciprocal_exit) {
-      domain.UseReciprocalExit();
-    }
+    domain.FromDepth(FromDepth());
     for (std::size_t lane = 0; lane < place.points.size(); ++lane) {
       AddBeam(channel, scene, place, place.points[lane], lane, domain);
     }

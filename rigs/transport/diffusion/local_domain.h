@@ -36,8 +36,7 @@ class LocalDomain {
 
   SolveSummary Solve(double tolerance);
 
-  /// Mean over a column of what leaves the top, mm⁻²: the flux, or what the adjoint of
-  /// a beam there collects.
+  /// Mean over a column of what leaves the top, mm⁻²: see FromDepth().
   double Exitance(std::size_t lane, std::size_t column) const {
     const Real value = exitance_[column].v[lane];
     return static_cast<double>(value);
@@ -51,8 +50,11 @@ class LocalDomain {
   };
   Budget BudgetOf(std::size_t lane) const;
 
-  /// Exitance as adjoint of the source, see DiffusionOptions::reciprocal_exit.
-  void UseReciprocalExit() { reciprocal_ = true; }
+  /// Exitance is (1 − share) · the flux through the surface + share · what the adjoint
+  /// of a beam collects, whose light is on its way out from one free path deep. In a
+  /// homogeneous slab the two hardly differ; near borders they do, and Monte Carlo is
+  /// in between (README.md).
+  void FromDepth(double share) { from_depth_ = share; }
   std::size_t MemoryBytes() const { return solver_.MemoryBytes(); }
 
  private:
@@ -65,7 +67,7 @@ class LocalDomain {
   std::vector<float> second_fraction_;
   std::vector<internal::Lanes<Real>> exitance_;
   std::vector<Budget> straight_;  // light that never scatters
-  bool reciprocal_ = false;
+  double from_depth_ = 0.5;
 };
 
 extern template class LocalDomain<float>;

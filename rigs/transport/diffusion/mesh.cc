@@ -23,7 +23,9 @@ Axis GradedAxis(const CoreAndMargins& layout, int* margin_cells) {
   double covered = 0;
   double width = layout.step_mm;
   while (covered < layout.margin_mm) {
-    width *= layout.growth;
+    if (margin.size() >= static_cast<std::size_t>(layout.guard)) {
+      width *= layout.growth;
+    }
     margin.push_back(width);
     covered += width;
   }

@@ -25,13 +25,14 @@ struct Mesh {
 
 Axis UniformAxis(double low_mm, double high_mm, int count);
 
-/// `count` cells of width `step_mm` from `low_mm` on, and on both sides cells that grow
-/// by `growth` a cell until they have covered `margin_mm`.
+/// `count` cells of width `step_mm` from `low_mm` on; on both sides `guard` more of
+/// them, then cells that grow by `growth` a cell until they have covered `margin_mm`.
 struct CoreAndMargins {
   double low_mm = 0;
   double step_mm = 1;
   int count = 1;
   double margin_mm = 0;
+  int guard = 0;
   double growth = 1.3;
 };
 /// Margins have equally many cells; `*margin_cells` is how many.

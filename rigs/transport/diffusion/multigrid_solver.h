@@ -39,7 +39,7 @@ class MultigridSolver {
 
   /// From a zero guess until the residual is below `tolerance` in every lane. Throws
   /// Error if that takes more than `most_iterations`.
-  SolveSummary Solve(double tolerance, int most_iterations = 60);
+  SolveSummary Solve(double tolerance, int most_iterations = 300);
 
   std::size_t MemoryBytes() const;
 

@@ -53,9 +53,7 @@ NearField::NearField(const ChannelSetup& setup,
       std::fill(values->begin(), values->end(), m == 0 ? 0.0F : 1.0F);
     }
     LocalDomain<double> domain(setup, mesh, fractions);
-    if (request.reciprocal_exit) {
-      domain.UseReciprocalExit();
-    }
+    domain.FromDepth(request.from_depth);
     for (const auto& [at, weight] : columns) {
       domain.AddBeam(0, column(at.first, at.second), m, weight);
     }

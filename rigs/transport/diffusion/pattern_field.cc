@@ -30,6 +30,7 @@ PatternFractions SampleFractions(const Pattern& pattern, const Mesh& mesh) {
   const auto nx = static_cast<std::size_t>(mesh.x.Count());
   const auto ny = static_cast<std::size_t>(mesh.y.Count());
   PatternFractions f;
+  f.mixed = pattern.type == PatternType::kMixture;
   f.column.resize(nx * ny);
   f.east.resize(nx * ny * kLinesSize);
   f.north.resize(nx * ny * kLinesSize);
@@ -68,7 +69,10 @@ LateralField MakeField(const PatternFractions& fractions, const ChannelSetup& se
     const double f = static_cast<double>(fractions.column[c]);
     field.sigma_a_per_mm.push_back(
         std::lerp(first.medium.sigma_a_per_mm, second.medium.sigma_a_per_mm, f));
-    field.diffusion_mm.push_back(std::lerp(first.diffusion_mm, second.diffusion_mm, f));
+    field.diffusion_mm.push_back(
+        fractions.mixed
+            ? 1 / std::lerp(1 / first.diffusion_mm, 1 / second.diffusion_mm, f)
+            : std::lerp(first.diffusion_mm, second.diffusion_mm, f));
     field.side_decay_per_mm.push_back(
         std::lerp(first.decay_per_mm, second.decay_per_mm, f));
     field.east_diffusion_mm.push_back(Between(

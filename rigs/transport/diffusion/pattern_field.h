@@ -13,6 +13,7 @@ namespace nacre::rigs::diffusion {
 /// centres. Borders needn't follow the mesh.
 struct PatternFractions {
   static constexpr int kLines = 8;  // across each column
+  bool mixed = false;               ///< media are mixed, not side by side
   std::vector<float> column;        ///< nx · ny, by area
   std::vector<float> east;  ///< nx · ny · kLines, between centres, line by line
   std::vector<float> north;
@@ -20,9 +21,10 @@ struct PatternFractions {
 
 PatternFractions SampleFractions(const Pattern& pattern, const Mesh& mesh);
 
-/// σ_a and the vertical D are means by area. Between two centres D is the harmonic mean
-/// along each of kLines parallel lines (layers in series) and the mean of the lines (in
-/// parallel): of second order for borders along the mesh, wherever they are.
+/// σ_a and the vertical D are means by area (of mixtures, 1 / D is). Between two
+/// centres D is the harmonic mean along each of kLines parallel lines (layers in
+/// series) and the mean of the lines (in parallel): of second order for borders along
+/// the mesh, wherever they are.
 LateralField MakeField(const PatternFractions& fractions, const ChannelSetup& setup);
 
 }  // namespace nacre::rigs::diffusion

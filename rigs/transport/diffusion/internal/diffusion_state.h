@@ -33,6 +33,8 @@ struct DiffusionTransport::Impl {
   int core = 1;
   std::vector<Channel> channels;
 
+  /// See LocalDomain::FromDepth().
+  double FromDepth() const { return options.reciprocal_exit ? 1 : 0.5; }
   Channel MakeChannel(std::size_t c, const ReferenceProfile& reference) const;
 
   // A mesh for the beams of one neighbourhood, and what it is filled with.
@@ -65,8 +67,7 @@ struct DiffusionTransport::Impl {
   std::vector<double> LogRatio(const Channel& channel,
                                const Scene& scene,
                                const diffusion::Neighbourhood& place,
-                               PointMm x_i,
-                               std::size_t home) const;
+                               PointMm x_i) const;
   std::vector<Window> Solve(const diffusion::Neighbourhood& place) const;
 };
 

@@ -36,6 +36,15 @@ double OverPlane(Function&& f) {
 const DiffusionMedium kMarble{0.0021, 2.19};
 const DiffusionMedium kDark{0.05, 1.0};
 
+// z_b is shorter than a free path then, and far sources must not overflow.
+TEST(RobinSlab, MatchedSurfaceIsFiniteAndSumsToItsTotal) {
+  for (const double thickness_mm : {kInfinity, 5.0}) {
+    const RobinSlab slab(SlabOf(kDark, thickness_mm, 1));
+    const double sum = OverPlane([&](double r) { return slab.Reflectance(r); });
+    EXPECT_NEAR(sum / slab.TotalReflectance(), 1, 2e-3) << thickness_mm;
+  }
+}
+
 // a' / ((1 + κ/σ_t') (1 + κ z_b)), from the ordinary differential equation in z.
 TEST(RobinSlab, ThickTotalIsClosed) {
   const RobinSlab slab(SlabOf(kMarble, kInfinity, 1.5));
