@@ -1,16 +1,17 @@
 // nacre simulate: R_d of a phantom by a model of light transport.
 
 #include "cli/command_line.h"
+#include "cli/simulate_task.h"
 #include "core/error.h"
 #include "core/exr.h"
-#include "core/fresnel.h"
-#include "core/parallel.h"
-#include "core/provenance.h"
+#include "core/options_json.h"
 #include "reconstruct/rd_dataset.h"
 #include "rigs/photo.h"
-#include "rigs/transport/transport.h"
+#include "rigs/transport/monte_carlo/monte_carlo_transport.h"
+#include "rigs/transport/solve_grid.h"
 
-#include <ctime>
+#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <vector>
@@ -22,31 +23,11 @@ using reconstruct::RdHeader;
 using reconstruct::RdSlice;
 using reconstruct::RdWriter;
 using rigs::Phantom;
-using rigs::Transport;
+using rigs::Quantity;
+using rigs::Selection;
+using rigs::Solver;
 
-struct Arguments {
-  std::filesystem::path phantom;
-  std::filesystem::path out;
-  std::string solver = "auto";
-  std::vector<double> beam_mm;
-  std::filesystem::path photo;
-  bool totals = false;
-  std::int64_t photons = 0;
-  double error = 0;
-};
-
-struct Task {
-  const Arguments& args;
-  const Common& common;
-  Phantom phantom;
-  rigs::Solver solver;
-  Provenance provenance;
-  double cpu_start = 0;
-};
-
-double CpuSeconds() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
+using Task = SimulateTask;
 
 void RequireGrid(const Task& task) {
   if (task.phantom.grid.points_x == 0) {
@@ -55,101 +36,158 @@ void RequireGrid(const Task& task) {
   }
 }
 
-// The flux that leaves within the window, a channel.
-Json WindowTotals(const Phantom& phantom, const std::vector<float>& rd) {
-  const double cell_mm2 = phantom.grid.pitch_mm * phantom.grid.pitch_mm;
-  const std::size_t cells = rd.size() / phantom.channels.size();
-  Json totals = Json::array();
-  for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
-    double sum = 0;
-    for (std::size_t k = 0; k < cells; ++k) {
-      sum += static_cast<double>(rd[c * cells + k]);
-    }
-    totals.push_back(sum * cell_mm2);
-  }
-  return totals;
+Json Merged(Json json, const Json& more) {
+  json.update(more);
+  return json;
 }
 
-void RunTotals(const Task& task) {
-  const std::unique_ptr<Transport> transport =
-      rigs::MakeTransport(task.phantom, task.solver, task.common.thread_count);
-  const std::vector<double>& beam = task.args.beam_mm;
-  const rigs::PointMm x_i =
-      beam.empty() ? rigs::PointMm{} : rigs::PointMm{beam[0], beam[1]};
+Json Means(const std::vector<rigs::monte_carlo::Estimate>& table) {
+  Json means = Json::array();
+  Json errors = Json::array();
+  for (const rigs::monte_carlo::Estimate& cell : table) {
+    means.push_back(cell.mean);
+    errors.push_back(cell.se);
+  }
+  return {{"mean", means}, {"se", errors}};
+}
+
+// Totals with tables by angle and depth, which Monte Carlo alone has.
+Json ResolvedTotals(const Task& task,
+                    const rigs::Transport& transport,
+                    std::size_t channel,
+                    rigs::Totals& totals) {
+  const auto* by_photons =
+      dynamic_cast<const rigs::monte_carlo::MonteCarloTransport*>(&transport);
+  if (by_photons == nullptr) {
+    throw UsageError("--cosines and --depths need --solver mc");
+  }
+  const rigs::monte_carlo::Result r =
+      by_photons->Simulate(task.Beam(),
+                           channel,
+                           {.cosine_count = task.args.cosine_count,
+                            .depth_count = task.args.depth_count,
+                            .depth_step_mm = task.args.depth_step_mm});
+  totals = rigs::monte_carlo::ToTotals(r);
+  Json json = Json::object();
+  if (task.args.cosine_count > 0) {
+    json["reflected_in_cosine"] = Means(r.reflected_in_cosine);
+    json["transmitted_in_cosine"] = Means(r.transmitted_in_cosine);
+  }
+  if (task.args.depth_count > 0) {
+    json["absorbed_in_depth"] = Means(r.absorbed_in_depth);
+  }
+  return json;
+}
+
+double Specular(const Task& task) {
+  rigs::monte_carlo::Source source =
+      rigs::monte_carlo::MakeSource(task.phantom.beam, {});
+  source.diffuse = task.options.diffuse;
+  return rigs::monte_carlo::SpecularReflectance(
+      source, rigs::monte_carlo::MakeVolume(task.phantom, 0));
+}
+
+void RunTotals(Task& task) {
+  const Selection selection = SelectFor(task, Quantity::kTotals);
+  const bool resolved = task.args.cosine_count > 0 || task.args.depth_count > 0;
   Json channels = Json::array();
   std::string text;
   for (std::size_t c = 0; c < task.phantom.channels.size(); ++c) {
-    const rigs::Totals totals = transport->TotalsAt(x_i, c);
-    channels.push_back({{"name", task.phantom.channels[c]},
-                        {"R", totals.reflected},
-                        {"R_se", 0.0},
-                        {"T", totals.transmitted},
-                        {"T_se", 0.0},
-                        {"A", totals.absorbed}});
-    text += fmt::format("{}{}: R {:.6f}  T {:.6f}  A {:.6f}",
+    rigs::Totals t;
+    Json tables = Json::object();
+    if (resolved) {
+      tables = ResolvedTotals(task, *selection.transport, c, t);
+    } else {
+      t = selection.transport->TotalsAt(task.Beam(), c);
+    }
+    channels.push_back(Merged({{"name", task.phantom.channels[c]},
+                               {"R", t.reflected},
+                               {"R_se", t.reflected_se},
+                               {"T", t.transmitted},
+                               {"T_se", t.transmitted_se},
+                               {"A", t.absorbed},
+                               {"A_se", t.absorbed_se},
+                               {"photons", t.photons}},
+                              tables));
+    text += fmt::format("{}{}: R {:.6f} ± {:.6f}  T {:.6f} ± {:.6f}  A {:.6f}",
                         c > 0 ? "\n" : "",
                         task.phantom.channels[c],
-                        totals.reflected,
-                        totals.transmitted,
-                        totals.absorbed);
+                        t.reflected,
+                        t.reflected_se,
+                        t.transmitted,
+                        t.transmitted_se,
+                        t.absorbed);
+    SayIfMissed(task, t.photons > 0 ? rigs::monte_carlo::RelativeError(t) : 0);
   }
   Print(task.common,
-        Json{{"channels", channels},
-             {"specular", FresnelReflectance(1, task.phantom.slab.eta)},
-             {"solver", "fast"},
-             {"cpu_seconds", CpuSeconds() - task.cpu_start}},
+        Merged({{"channels", channels}, {"specular", Specular(task)}},
+               About(task, selection)),
         text);
+}
+
+ExrPart SlicePart(const Task& task,
+                  const char* name,
+                  const std::vector<float>& values) {
+  ExrPart part;
+  part.name = name;
+  part.width = task.phantom.grid.core;
+  part.height = task.phantom.grid.core;
+  part.channels = task.phantom.channels;
+  part.values = values;
+  part.attributes = {{"nacre.units", "mm^-2"},
+                     {"nacre.pitch_mm", fmt::format("{}", task.phantom.grid.pitch_mm)},
+                     {"nacre.provenance", task.provenance.ToString()}};
+  return part;
 }
 
 void RunBeam(Task& task) {
   RequireGrid(task);
-  const std::unique_ptr<Transport> transport =
-      rigs::MakeTransport(task.phantom, task.solver, task.common.thread_count);
-  const rigs::Window window =
-      transport->WindowAround({task.args.beam_mm[0], task.args.beam_mm[1]});
-  const Json totals = WindowTotals(task.phantom, window.rd);
-  ExrPart slice;
-  slice.name = "rd";
-  slice.width = task.phantom.grid.core;
-  slice.height = task.phantom.grid.core;
-  slice.channels = task.phantom.channels;
-  slice.values = window.rd;
+  const Selection selection = SelectFor(task, Quantity::kWindow);
   task.provenance.options["beam_mm"] = task.args.beam_mm;
-  slice.attributes = {{"nacre.units", "mm^-2"},
-                      {"nacre.pitch_mm", fmt::format("{}", task.phantom.grid.pitch_mm)},
-                      {"nacre.provenance", task.provenance.ToString()}};
-  WriteExr(task.args.out, {slice});
+  rigs::Window window;
+  const rigs::PointMm x_i = task.Beam();
+  selection.transport->SolveWindows(
+      {&x_i, 1},
+      [&](std::size_t, rigs::Window&& solved) { window = std::move(solved); },
+      ConsoleProgress(task.common));
+  WriteExr(task.args.out,
+           {SlicePart(task, "rd", window.rd), SlicePart(task, "stderr", window.sigma)});
+  const WindowFigures figures = FiguresOf(task.phantom, window);
+  SayIfMissed(task, figures.worst_noise);
   Print(task.common,
-        Json{{"file", task.args.out.string()},
-             {"window_totals", totals},
-             {"solver", "fast"},
-             {"cpu_seconds", CpuSeconds() - task.cpu_start}},
+        Merged({{"file", task.args.out.string()},
+                {"window_totals", figures.flux},
+                {"noise", figures.noise}},
+               About(task, selection)),
         task.args.out.string());
 }
 
 void RunPhoto(Task& task) {
   const std::vector<ExrPart> parts = ReadExr(task.args.photo);
-  ExrPart photo = rigs::PhotographUnder(task.phantom,
-                                        task.solver,
-                                        parts.front(),
-                                        task.common.thread_count,
-                                        ConsoleProgress(task.common));
   task.provenance.AddInput(task.args.photo);
-  photo.name = "exitance";
-  photo.attributes = {{"nacre.provenance", task.provenance.ToString()}};
-  WriteExr(task.args.out, {photo});
+  const Selection selection = SelectFor(task, Quantity::kWindow);
+  rigs::Photo photo = rigs::PhotographUnder(task.phantom,
+                                            selection.solver,
+                                            parts.front(),
+                                            task.options,
+                                            ConsoleProgress(task.common));
+  photo.exitance.name = "exitance";
+  photo.exitance.attributes = {{"nacre.provenance", task.provenance.ToString()}};
+  std::vector<ExrPart> result{std::move(photo.exitance)};
+  if (!photo.standard_error.values.empty()) {
+    photo.standard_error.name = "stderr";
+    result.push_back(std::move(photo.standard_error));
+  }
+  WriteExr(task.args.out, result);
   Print(task.common,
-        Json{{"file", task.args.out.string()},
-             {"solver", "fast"},
-             {"cpu_seconds", CpuSeconds() - task.cpu_start}},
+        Merged({{"file", task.args.out.string()}}, About(task, selection)),
         task.args.out.string());
 }
 
 void RunDataset(Task& task) {
   RequireGrid(task);
+  const Selection selection = SelectFor(task, Quantity::kWindow);
   const Phantom& phantom = task.phantom;
-  const std::unique_ptr<Transport> transport =
-      rigs::MakeTransport(phantom, task.solver, task.common.thread_count);
   const RdHeader header{.points_x = phantom.grid.points_x,
                         .points_y = phantom.grid.points_y,
                         .core = phantom.grid.core,
@@ -158,60 +196,65 @@ void RunDataset(Task& task) {
                         .channels = phantom.channels,
                         .provenance = task.provenance.ToString()};
   RdWriter writer(task.args.out, header);
-  const ProgressFunction progress = ConsoleProgress(task.common);
-  // A few rows of slices are in memory at a time, whatever the size of the dataset.
-  constexpr int kRows = 4;
-  for (int first = 0; first < header.points_y; first += kRows) {
-    const int rows = std::min(kRows, header.points_y - first);
-    const std::int64_t count = std::int64_t{rows} * header.points_x;
-    std::vector<rigs::Window> windows(static_cast<std::size_t>(count));
-    ParallelFor(count, task.common.thread_count, [&](std::int64_t k) {
-      const int i = static_cast<int>(k % header.points_x);
-      const int j = first + static_cast<int>(k / header.points_x);
-      windows[static_cast<std::size_t>(k)] =
-          transport->WindowAround(phantom.grid.Point(i, j));
-    });
-    for (std::int64_t k = 0; k < count; ++k) {
-      RdSlice slice = reconstruct::MakeSlice(header);
-      slice.rd = std::move(windows[static_cast<std::size_t>(k)].rd);
-      slice.sigma = std::move(windows[static_cast<std::size_t>(k)].sigma);
-      writer.WriteSlice(static_cast<int>(k % header.points_x),
-                        first + static_cast<int>(k / header.points_x),
-                        slice);
-    }
-    Report(progress, {"simulate", first + rows, header.points_y, "rows"});
-  }
+  double worst_noise = 0;
+  const rigs::GridSummary summary = rigs::SolveGrid(
+      *selection.transport,
+      [&](int i, int j, rigs::Window&& window) {
+        worst_noise = std::max(worst_noise, FiguresOf(phantom, window).worst_noise);
+        RdSlice slice = reconstruct::MakeSlice(header);
+        slice.rd = std::move(window.rd);
+        slice.sigma = std::move(window.sigma);
+        writer.WriteSlice(i, j, slice);
+      },
+      ConsoleProgress(task.common));
   writer.Finish();
+  SayIfMissed(task, worst_noise);
   Print(task.common,
-        Json{{"file", task.args.out.string()},
-             {"points", {header.points_x, header.points_y}},
-             {"core", header.core},
-             {"channels", header.channels},
-             {"solver", "fast"},
-             {"cpu_seconds", CpuSeconds() - task.cpu_start}},
+        Merged({{"file", task.args.out.string()},
+                {"points", {header.points_x, header.points_y}},
+                {"distinct_points", summary.distinct},
+                {"core", header.core},
+                {"channels", header.channels},
+                {"noise", NumberOrNull(worst_noise)}},
+               About(task, selection)),
         task.args.out.string());
 }
 
-void CheckArguments(const Arguments& args) {
+void CheckArguments(const SimulateArguments& args) {
   if (!args.photo.empty() && (!args.beam_mm.empty() || args.totals)) {
     throw UsageError("--photo goes with neither --beam nor --totals");
   }
   if (!args.totals && args.out.empty()) {
     throw UsageError("--out FILE is needed, unless only --totals are wanted");
   }
-  if (args.photons != 0 || args.error != 0) {
-    throw UsageError(
-        "--photons and --error steer the mc solver, which this build doesn't have; the "
-        "fast one is deterministic");
+  for (const double coordinate : args.beam_mm) {
+    if (!std::isfinite(coordinate)) {
+      throw UsageError(fmt::format("--beam: {} is not a position in mm", coordinate));
+    }
+  }
+  if (!args.totals && (args.cosine_count > 0 || args.depth_count > 0)) {
+    throw UsageError("--cosines and --depths go with --totals");
+  }
+  if ((args.depth_count > 0) != (args.depth_step_mm > 0)) {
+    throw UsageError("--depths N and --depth-step MM go together");
+  }
+  if (rigs::ParseSolver(args.solver) != Solver::kMonteCarlo &&
+      rigs::ParseSolver(args.solver) != Solver::kAuto && args.options.photons > 0) {
+    throw UsageError("--photons steers the mc solver; " + args.solver +
+                     " is deterministic");
   }
 }
 
-int Run(const Arguments& args, const Common& common) {
-  Task task{args, common, {}, rigs::ParseSolver(args.solver), {}, CpuSeconds()};
+int Run(const SimulateArguments& args, const Common& common) {
   CheckArguments(args);
+  Task task{args, common, {}, args.options, {}, CpuSeconds()};
+  task.options.seed = static_cast<std::int64_t>(common.seed);
+  task.options.thread_count = common.thread_count;
+  Validate(task.options);
   task.phantom = rigs::ReadPhantom(args.phantom);
   task.provenance.command = "simulate";
-  task.provenance.options = Json{{"solver", "fast"}};
+  task.provenance.options = OptionsToJson(task.options);
+  task.provenance.options.erase("thread_count");  // it changes no result
   task.provenance.AddInput(args.phantom);
   if (args.totals) {
     RunTotals(task);
@@ -225,14 +268,59 @@ int Run(const Arguments& args, const Common& common) {
   return 0;
 }
 
+// Whole numbers as people write them: 2000000, 2e6.
+std::string WholeNumber(const std::string& text) {
+  try {
+    std::size_t used = 0;
+    const double value = std::stod(text, &used);
+    if (used == text.size() && value == std::floor(value) && std::abs(value) < 1e18) {
+      return fmt::format("{:.0f}", value);
+    }
+  } catch (const std::logic_error&) {
+    // No number at all: CLI11 says so better.
+    return text;
+  }
+  return text;
+}
+
+void AddMonteCarloOptions(CLI::App& app, SimulateArguments& args) {
+  app.add_option(
+         "--photons",
+         args.options.photons,
+         "mc: photons a beam and channel (1e6 if nothing is said); with --error "
+         "the most")
+      ->transform(WholeNumber)
+      ->check(CLI::Range(1.0, 1e15));
+  app.add_option("--error",
+                 args.options.error,
+                 "relative error: auto takes the cheapest solver that states it, mc "
+                 "goes on until its noise is that")
+      ->check(CLI::Range(1e-6, 1.0));
+  app.add_flag("--diffuse",
+               args.options.diffuse,
+               "mc: light arrives by Lambert's law, not at the beam's angle");
+  app.add_option(
+         "--cosines",
+         args.cosine_count,
+         "mc, with --totals: R and T in so many bins of the exit angle's cosine")
+      ->check(CLI::Range(0, 100'000));
+  app.add_option(
+         "--depths", args.depth_count, "mc, with --totals: A in so many bins of depth")
+      ->check(CLI::Range(0, 1'000'000));
+  app.add_option("--depth-step", args.depth_step_mm, "thickness of those, mm")
+      ->check(CLI::PositiveNumber);
+}
+
 }  // namespace
 
 std::function<int()> MakeSimulateVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<SimulateArguments>();
   app.add_option("phantom", args->phantom, "the slab and its media, TOML")->required();
   app.add_option("-o,--out", args->out, "what to write: *.rd.exr, or *.exr for a slice")
       ->type_name("FILE");
-  app.add_option("--solver", args->solver, "fast, or auto for the best there is")
+  app.add_option("--solver",
+                 args->solver,
+                 "mc, diffusion, fast, or auto for the cheapest that meets --error")
       ->capture_default_str();
   app.add_option("--beam", args->beam_mm, "one slice only, with the beam there (mm)")
       ->type_name("X,Y")
@@ -248,8 +336,7 @@ std::function<int()> MakeSimulateVerb(CLI::App& app, const Common& common) {
       args->totals,
       "reflected, transmitted and absorbed fractions of what enters at --beam, "
       "or at the origin");
-  app.add_option("--photons", args->photons, "for solvers that trace photons");
-  app.add_option("--error", args->error, "for solvers that trace photons");
+  AddMonteCarloOptions(app, *args);
   return [args, &common] { return Run(*args, common); };
 }
 

@@ -3,11 +3,14 @@
 #include "core/error.h"
 #include "core/fresnel.h"
 #include "core/parallel.h"
+#include "rigs/transport/monte_carlo/monte_carlo_transport.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <memory>
+#include <span>
+#include <utility>
 
 namespace nacre::rigs {
 namespace {
@@ -36,10 +39,10 @@ Phantom WithPixelGrid(Phantom phantom, const ExrPart& image) {
   return phantom;
 }
 
-int CoreFor(const Phantom& phantom, Solver solver, int thread_count) {
+int CoreFor(const Phantom& phantom, Solver solver, const SolverOptions& options) {
   Phantom without_grid = phantom;
   without_grid.grid = {};
-  const auto transport = MakeTransport(without_grid, solver, thread_count);
+  const auto transport = MakeTransport(without_grid, solver, options);
   double reach_mm = 0;
   for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
     reach_mm = std::max(reach_mm, transport->ReachMm(c));
@@ -97,40 +100,129 @@ void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exita
   }
 }
 
-}  // namespace
-
-ExrPart PhotographUnder(const Phantom& phantom,
-                        Solver solver,
-                        const ExrPart& illumination,
-                        int thread_count,
-                        const ProgressFunction& progress) {
-  Phantom by_pixel = WithPixelGrid(phantom, illumination);
-  by_pixel.grid.core = CoreFor(by_pixel, solver, thread_count);
-  const auto transport = MakeTransport(by_pixel, solver, thread_count);
-  Scene scene{transport.get(), &illumination, {}};
+std::vector<std::size_t> ImageChannels(const Phantom& phantom,
+                                       const ExrPart& illumination) {
+  std::vector<std::size_t> channels;
   for (const std::string& channel : phantom.channels) {
     const int index = illumination.FindChannel(channel);
     if (index < 0) {
       throw BadData("the illumination has no channel " + channel +
                     ", which the phantom has");
     }
-    scene.image_channel.push_back(static_cast<std::size_t>(index));
+    channels.push_back(static_cast<std::size_t>(index));
   }
-  ExrPart result;
-  result.width = illumination.width;
-  result.height = illumination.height;
-  result.channels = phantom.channels;
-  const std::size_t size = phantom.channels.size() * illumination.PixelCount();
-  result.values.assign(size, 0.0F);
+  for (const float e : illumination.values) {
+    if (!(e >= 0) || !std::isfinite(e)) {
+      throw BadData(fmt::format(
+          "the illumination has a pixel of {}; light can't be negative, nor infinite",
+          e));
+    }
+  }
+  return channels;
+}
+
+ExrPart BlackPicture(const Phantom& phantom, const ExrPart& illumination) {
+  ExrPart picture;
+  picture.width = illumination.width;
+  picture.height = illumination.height;
+  picture.channels = phantom.channels;
+  picture.values.assign(phantom.channels.size() * illumination.PixelCount(), 0.0F);
+  return picture;
+}
+
+// Photons of one channel of the whole picture.
+monte_carlo::Result FollowPhotons(const monte_carlo::MonteCarloTransport& transport,
+                                  std::size_t channel,
+                                  std::span<const double> flux,
+                                  const ProgressFunction& progress) {
+  const acquire::GridDescription& grid = transport.phantom().grid;
+  std::vector<PointMm> centres;
+  for (int row = 0; row < grid.points_y; ++row) {
+    for (int column = 0; column < grid.points_x; ++column) {
+      centres.push_back(grid.Point(column, row));
+    }
+  }
+  monte_carlo::Source source = transport.SourceAt({});
+  source.footprint = std::make_shared<const monte_carlo::Footprint>(
+      monte_carlo::MakeFootprint(centres, flux));
+  // A window with the picture in its upper left corner.
+  const int core = std::max(grid.points_x, grid.points_y) | 1;
+  const auto window_centre = [&](int points) {
+    return 0.5 * grid.pitch_mm * (core - points);
+  };
+  return transport.SimulateLight(
+      source,
+      channel,
+      {.window_centre = {window_centre(grid.points_x), -window_centre(grid.points_y)},
+       .window_core = core,
+       .window_pitch_mm = grid.pitch_mm},
+      progress);
+}
+
+Photo PhotographByPhotons(const Phantom& by_pixel,
+                          const ExrPart& illumination,
+                          const SolverOptions& options,
+                          const ProgressFunction& progress) {
+  const auto made = MakeTransport(by_pixel, Solver::kMonteCarlo, options, progress);
+  const auto* transport =
+      dynamic_cast<const monte_carlo::MonteCarloTransport*>(made.get());
+  Expect(transport != nullptr, "Monte Carlo as asked for");
+  const std::vector<std::size_t> channels = ImageChannels(by_pixel, illumination);
+  const double pixel_mm2 = by_pixel.grid.pitch_mm * by_pixel.grid.pitch_mm;
+  Photo photo{BlackPicture(by_pixel, illumination),
+              BlackPicture(by_pixel, illumination)};
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    std::vector<double> flux;
+    double sum = 0;
+    for (std::size_t k = 0; k < illumination.PixelCount(); ++k) {
+      flux.push_back(static_cast<double>(illumination.Channel(channels[c])[k]) *
+                     pixel_mm2);
+      sum += flux.back();
+    }
+    if (sum == 0) {
+      continue;  // a dark channel is black
+    }
+    const monte_carlo::Result r = FollowPhotons(*transport, c, flux, progress);
+    const double entered = (1 - r.specular) * sum;
+    const auto core =
+        static_cast<std::size_t>(std::max(illumination.width, illumination.height) | 1);
+    const auto width = static_cast<std::size_t>(illumination.width);
+    for (std::size_t k = 0; k < illumination.PixelCount(); ++k) {
+      const monte_carlo::Estimate& cell =
+          r.window_per_mm2[k / width * core + k % width];
+      photo.exitance.Channel(c)[k] = static_cast<float>(entered * cell.mean);
+      photo.standard_error.Channel(c)[k] = static_cast<float>(entered * cell.se);
+    }
+  }
+  return photo;
+}
+
+}  // namespace
+
+Photo PhotographUnder(const Phantom& phantom,
+                      Solver solver,
+                      const ExrPart& illumination,
+                      const SolverOptions& options,
+                      const ProgressFunction& progress) {
+  Phantom by_pixel = WithPixelGrid(phantom, illumination);
+  if (solver == Solver::kMonteCarlo) {
+    return PhotographByPhotons(by_pixel, illumination, options, progress);
+  }
+  by_pixel.grid.core = CoreFor(by_pixel, solver, options);
+  const auto transport = MakeTransport(by_pixel, solver, options);
+  const Scene scene{
+      transport.get(), &illumination, ImageChannels(phantom, illumination)};
+  Photo photo{BlackPicture(phantom, illumination), {}};
+  std::vector<float>& values = photo.exitance.values;
   // Pictures of parts of the light, added in order: the same sum on any thread count.
   constexpr int kParts = 8;
   for (int first_row = 0; first_row < illumination.height; first_row += kParts) {
     std::vector<std::vector<float>> parts(kParts);
-    ParallelFor(kParts, thread_count, [&](std::int64_t part) {
+    ParallelFor(kParts, options.thread_count, [&](std::int64_t part) {
       const int row = first_row + static_cast<int>(part);
       if (row < illumination.height) {
         auto& exitance = parts[static_cast<std::size_t>(part)];
-        exitance.assign(size, 0.0F);
+        exitance.assign(values.size(), 0.0F);
         for (int column = 0; column < illumination.width; ++column) {
           AddPixel(scene, column, row, exitance);
         }
@@ -138,7 +230,7 @@ ExrPart PhotographUnder(const Phantom& phantom,
     });
     for (const std::vector<float>& part : parts) {
       for (std::size_t k = 0; k < part.size(); ++k) {
-        result.values[k] += part[k];
+        values[k] += part[k];
       }
     }
     Report(progress,
@@ -147,7 +239,20 @@ ExrPart PhotographUnder(const Phantom& phantom,
             illumination.height,
             ""});
   }
-  return result;
+  return photo;
+}
+
+ExrPart PhotographUnder(const Phantom& phantom,
+                        Solver solver,
+                        const ExrPart& illumination,
+                        int thread_count,
+                        const ProgressFunction& progress) {
+  return PhotographUnder(phantom,
+                         solver,
+                         illumination,
+                         SolverOptions{.thread_count = thread_count},
+                         progress)
+      .exitance;
 }
 
 }  // namespace nacre::rigs

@@ -1,8 +1,10 @@
 // Photons per CPU-second, and the figure of merit 1 / (variance × CPU-seconds) of one
 // cell 2 mm from the beam, of the packets and of the scalar oracle's methods.
-//   monte_carlo_speed [photons] [scalar photons]
+//   monte_carlo_speed [photons]         the best instruction set, half a minute
+//   monte_carlo_speed --all [photons]   all of them, and the scalar oracle's methods
 #include "rigs/transport/monte_carlo/scalar_oracle.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -76,16 +78,21 @@ void Print(const std::string& name, const std::string& method, const Result& r) 
       1 / (cell.se * cell.se * r.cpu_seconds));
 }
 
-void Run(const Case& c, std::int64_t photons, std::int64_t scalar_photons) {
+void Run(const Case& c, std::int64_t photons, bool all) {
   const TallyRequest request{
       .window_centre = c.source.centre, .window_core = 39, .window_pitch_mm = 0.25};
   Options options{.photon_count = photons, .seed = 7, .thread_count = 1};
-  for (const std::string& set : InstructionSets()) {
+  std::vector<std::string> sets = InstructionSets();
+  sets.resize(all ? sets.size() : 1);
+  for (const std::string& set : sets) {
     UseInstructionSet(set);
     Print(c.name, "packets " + set, Simulate(c.volume, c.source, request, options));
   }
   UseInstructionSet("");
-  options.photon_count = scalar_photons;
+  if (!all) {
+    return;
+  }
+  options.photon_count = std::max<std::int64_t>(1, photons / 40);
   for (const Capture capture : {Capture::kAnalog, Capture::kImplicit}) {
     for (const Tracking tracking : {Tracking::kExact, Tracking::kWoodcock}) {
       const std::string method =
@@ -103,10 +110,11 @@ void Run(const Case& c, std::int64_t photons, std::int64_t scalar_photons) {
 }  // namespace nacre::rigs::monte_carlo
 
 int main(int argc, char** argv) {
-  const std::int64_t photons = argc > 1 ? std::atoll(argv[1]) : 4'000'000;
-  const std::int64_t scalar_photons = argc > 2 ? std::atoll(argv[2]) : 100'000;
+  const bool all = argc > 1 && std::string(argv[1]) == "--all";
+  const int at = all ? 2 : 1;
+  const std::int64_t photons = argc > at ? std::atoll(argv[at]) : 4'000'000;
   for (const auto& c : nacre::rigs::monte_carlo::Cases()) {
-    nacre::rigs::monte_carlo::Run(c, photons, scalar_photons);
+    nacre::rigs::monte_carlo::Run(c, photons, all);
   }
   return 0;
 }

@@ -138,7 +138,7 @@ RadialTable RoundBeamTable(const Phantom& phantom,
 }  // namespace
 
 PathAveraged::PathAveraged(const Phantom& phantom, int thread_count)
-    : phantom_(phantom), beam_(1) {
+    : Transport(thread_count), phantom_(phantom), beam_(1) {
   CheckPhantom(phantom);
   constexpr double kLossBeyondReach = 1e-4;
   const Beam& beam = phantom.beam;

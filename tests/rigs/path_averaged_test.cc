@@ -291,7 +291,7 @@ TEST(Solvers, AreNamed) {
   EXPECT_EQ(ParseSolver("fast"), Solver::kFast);
   EXPECT_EQ(ParseSolver("auto"), Solver::kAuto);
   EXPECT_THAT([] { ParseSolver("photon soup"); },
-              ::testing::ThrowsMessage<Error>(HasSubstr("it has: fast")));
+              ::testing::ThrowsMessage<Error>(HasSubstr("there are: auto, fast")));
 }
 
 }  // namespace

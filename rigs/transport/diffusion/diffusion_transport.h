@@ -18,14 +18,17 @@ using ReferenceProfile =
 /// The heterogeneous diffusion equation −∇·(D∇φ) + σ_a φ = q on a mesh around each x_i,
 /// finite volumes, Robin boundaries, a source all along the beam; see README.md.
 ///
-/// What the mesh can't resolve next to the beam is corrected: each value is multiplied
-/// by reference / discrete of a homogeneous slab at the same offset, solved once on the
-/// same mesh (of two media: their geometric mean by the segment's share of each). The
-/// reference is diffusion's exact solution, RobinSlab, or what the caller gives (a
-/// Monte Carlo profile makes homogeneous regions exact transport).
+/// What diffusion and the mesh get wrong near the beam is corrected: each value is
+/// multiplied by reference / discrete of a homogeneous slab at the same offset, solved
+/// once on the same mesh (of two media: their geometric mean by the segment's share of
+/// each). The reference is Monte Carlo of each medium, simulated by the constructor
+/// (options.reference_photons; some seconds), which makes homogeneous regions exact
+/// transport; or diffusion's own exact solution, RobinSlab; or what the caller gives.
 class DiffusionTransport final : public Transport {
  public:
-  /// Throws BadData for what diffusion can't do: an oblique beam, an empty medium.
+  /// Throws BadData for what diffusion can't do (layers, media that change with depth,
+  /// an oblique beam, an empty medium), and for a medium without absorption in an
+  /// infinitely thick slab unless the reference is something else than Monte Carlo.
   explicit DiffusionTransport(const Phantom& phantom,
                               const DiffusionOptions& options = {},
                               const ReferenceProfile& reference = {});
@@ -40,6 +43,7 @@ class DiffusionTransport final : public Transport {
                    const PointColumns& points,
                    float* exitance) const override;
   double ReachMm(std::size_t channel) const override;
+  /// Of pure diffusion: the reference has no part in them.
   Totals TotalsAt(PointMm x_i, std::size_t channel) const override;
 
   /// What truncation costs at x_i: the part of the light that leaves through the sides
@@ -52,7 +56,7 @@ class DiffusionTransport final : public Transport {
   /// thread. Results don't depend on the thread count.
   void SolveWindows(std::span<const PointMm> points,
                     const std::function<void(std::size_t k, Window&& window)>& use,
-                    const ProgressFunction& progress = {}) const;
+                    const ProgressFunction& progress = {}) const override;
 
   /// Of one neighbourhood's solver.
   std::size_t MemoryBytes() const;

@@ -9,13 +9,15 @@
 #include <algorithm>
 #include <ctime>
 #include <fmt/format.h>
+#include <memory>
 #include <mutex>
+#include <utility>
+#include <vector>
 
 namespace nacre::rigs::monte_carlo {
 namespace {
 
-// Long enough for full lanes, short enough for progress; a power of two, so that no
-// block straddles a multiple of 2³².
+// Long enough for full lanes, short enough for progress.
 constexpr std::int64_t kBlock = 1 << 16;
 
 void Validate(const TallyRequest& request) {
@@ -59,45 +61,100 @@ std::int64_t BlockSize(std::int64_t photon_count, int thread_count) {
 
 }  // namespace
 
+struct Simulation::State {
+  State(const Volume& volume_in,
+        const Source& source,
+        const TallyRequest& request_in,
+        const Options& options)
+      : volume(volume_in),
+        request(request_in),
+        job{.packet_volume = internal::MakePacketVolume(volume),
+            .volume = &volume,
+            .source = source,
+            .seed = static_cast<std::uint64_t>(options.seed)},
+        total(request, volume.media.size()),
+        thread_count(options.thread_count) {}
+
+  Volume volume;
+  TallyRequest request;
+  internal::PacketJob job;
+  CountTally total;
+  int thread_count;
+  std::int64_t photon_count = 0;
+  double cpu_seconds = 0;
+};
+
+Simulation::Simulation(const Volume& volume,
+                       const Source& source,
+                       const TallyRequest& request,
+                       const Options& options) {
+  Validate(volume);
+  Validate(source);
+  Validate(request);
+  nacre::Validate(options);
+  state_ = std::make_unique<State>(volume, source, request, options);
+}
+
+Simulation::~Simulation() = default;
+
+void Simulation::Add(std::int64_t photon_count, const ProgressFunction& progress) {
+  State& s = *state_;
+  const std::int64_t first = s.photon_count;
+  std::int64_t done = first;
+  // As many tallies as threads: a window may be large.
+  std::vector<std::unique_ptr<CountTally>> idle;
+  std::mutex mutex;
+  const auto take = [&]() -> std::unique_ptr<CountTally> {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (idle.empty()) {
+      return std::make_unique<CountTally>(s.request, s.volume.media.size());
+    }
+    std::unique_ptr<CountTally> tally = std::move(idle.back());
+    idle.pop_back();
+    return tally;
+  };
+  ParallelForBlocks(
+      photon_count,
+      BlockSize(photon_count, s.thread_count),
+      s.thread_count,
+      [&](std::int64_t begin, std::int64_t end) {
+        std::unique_ptr<CountTally> tally = take();
+        const double start = ThreadCpuSeconds();
+        internal::RunPhotons(s.job, first + begin, first + end, *tally);
+        const double seconds = ThreadCpuSeconds() - start;
+        const std::lock_guard<std::mutex> lock(mutex);
+        idle.push_back(std::move(tally));
+        s.cpu_seconds += seconds;
+        done += end - begin;
+        Report(progress, {"monte carlo", done, first + photon_count, "photons"});
+      });
+  for (const std::unique_ptr<CountTally>& tally : idle) {
+    s.total.Merge(*tally);
+  }
+  s.photon_count += photon_count;
+}
+
+Result Simulation::Get() const {
+  const State& s = *state_;
+  Expect(s.photon_count > 0, "at least one photon");
+  Result result = s.total.ToResult(s.photon_count);
+  result.specular = SpecularReflectance(s.job.source, s.volume);
+  if (s.request.use_symmetry && s.request.window_centre.x == s.job.source.centre.x &&
+      s.request.window_centre.y == s.job.source.centre.y) {
+    AverageImages(Symmetries(s.volume, s.job.source), s.request, result);
+  }
+  result.cpu_seconds = s.cpu_seconds;
+  return result;
+}
+
 Result Simulate(const Volume& volume,
                 const Source& source,
                 const TallyRequest& request,
                 const Options& options,
                 const ProgressFunction& progress) {
-  Validate(volume);
-  Validate(source);
-  Validate(request);
-  nacre::Validate(options);
-  const internal::PacketJob job{.packet_volume = internal::MakePacketVolume(volume),
-                                .volume = &volume,
-                                .source = source,
-                                .seed = static_cast<std::uint64_t>(options.seed)};
-  CountTally total(request, volume.media.size());
-  double cpu_seconds = 0;
-  std::int64_t done = 0;
-  std::mutex mutex;
-  ParallelForBlocks(options.photon_count,
-                    BlockSize(options.photon_count, options.thread_count),
-                    options.thread_count,
-                    [&](std::int64_t begin, std::int64_t end) {
-                      const double start = ThreadCpuSeconds();
-                      CountTally tally(request, volume.media.size());
-                      internal::RunPhotons(job, begin, end, tally);
-                      const double seconds = ThreadCpuSeconds() - start;
-                      const std::lock_guard<std::mutex> lock(mutex);
-                      total.Merge(tally);
-                      cpu_seconds += seconds;
-                      done += end - begin;
-                      Report(progress, {"monte carlo", done, options.photon_count, ""});
-                    });
-  Result result = total.ToResult(options.photon_count);
-  result.specular = SpecularReflectance(source, volume);
-  if (request.use_symmetry && request.window_centre.x == source.centre.x &&
-      request.window_centre.y == source.centre.y) {
-    AverageImages(Symmetries(volume, source), request, result);
-  }
-  result.cpu_seconds = cpu_seconds;
-  return result;
+  Simulation simulation(volume, source, request, options);
+  simulation.Add(options.photon_count, progress);
+  return simulation.Get();
 }
 
 std::vector<std::string> InstructionSets() {

@@ -6,7 +6,7 @@
 #include "rigs/transport/monte_carlo/volume.h"
 
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -80,6 +80,29 @@ Result Simulate(const Volume& volume,
                 const TallyRequest& request,
                 const Options& options,
                 const ProgressFunction& progress = {});
+
+/// A simulation that photons are added to until they are enough. Photons are their own:
+/// two additions give what one of their sum gives, bit for bit.
+class Simulation {
+ public:
+  /// options.photon_count is ignored. Throws as Simulate does.
+  Simulation(const Volume& volume,
+             const Source& source,
+             const TallyRequest& request,
+             const Options& options);
+  ~Simulation();
+  Simulation(const Simulation&) = delete;
+  Simulation& operator=(const Simulation&) = delete;
+
+  /// Throws Interrupted; the simulation is of no more use then.
+  void Add(std::int64_t photon_count, const ProgressFunction& progress = {});
+  /// Of all photons so far, at least one.
+  Result Get() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// The instruction sets this machine can run, best first, by Highway's names.
 std::vector<std::string> InstructionSets();

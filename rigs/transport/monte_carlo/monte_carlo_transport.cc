@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "rigs/transport/monte_carlo/tally.h"
 
 #include <algorithm>
 #include <array>
@@ -10,6 +11,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <string>
 
 namespace nacre::rigs::monte_carlo {
 namespace {
@@ -30,10 +32,110 @@ std::int64_t SeedOf(std::int64_t seed, std::size_t channel, PointMm x_i) {
                                    block[1]);
 }
 
+// Positions are single precision; where the volume repeats, a beam far out is as one
+// near the origin.
+PointMm NearOrigin(const Volume& volume, PointMm x_i) {
+  const auto reduced = [](double coordinate_mm, double period_mm) {
+    return coordinate_mm - period_mm * std::round(coordinate_mm / period_mm);
+  };
+  if (volume.voxels || volume.box) {
+    return x_i;
+  }
+  const double period_mm = 2 * volume.pattern.cell_mm;
+  switch (volume.pattern.type) {
+    case PatternType::kHomogeneous:
+      return {0, 0};
+    case PatternType::kChessboard:
+      return {reduced(x_i.x, period_mm), reduced(x_i.y, period_mm)};
+    case PatternType::kStripes:
+      return {reduced(x_i.x, period_mm), 0};
+    default:
+      return x_i;
+  }
+}
+
+bool OnBorder(double coordinate_mm, double cell_mm) {
+  const double u = coordinate_mm / cell_mm;
+  return std::abs(u - std::round(u)) < 1e-6;
+}
+
+// A pencil on the border of two media enters both: it is the limit of beams that
+// narrow, not whatever cell rounding finds it in.
+Source SharedAtBorders(Source source, const Pattern& pattern) {
+  const bool in_cells =
+      pattern.type == PatternType::kChessboard || pattern.type == PatternType::kStripes;
+  if (!in_cells || source.shape != BeamShape::kPencil) {
+    return source;
+  }
+  const bool on_border = source.footprint ||  // which may have places on borders
+                         OnBorder(source.centre.x, pattern.cell_mm) ||
+                         (pattern.type == PatternType::kChessboard &&
+                          OnBorder(source.centre.y, pattern.cell_mm));
+  if (on_border) {
+    source.shape = BeamShape::kSquare;
+    source.width_mm = 1e-4 * pattern.cell_mm;
+  }
+  return source;
+}
+
+void RequireFinite(PointMm x_i) {
+  if (!std::isfinite(x_i.x) || !std::isfinite(x_i.y)) {
+    throw BadData("Monte Carlo: a beam at (" + std::to_string(x_i.x) + ", " +
+                  std::to_string(x_i.y) + ") mm; positions must be finite");
+  }
+}
+
+// Photons for the error to fall to `wanted`, by the root law and with 5 % to spare.
+std::int64_t PhotonsFor(const Result& result, double wanted, std::int64_t most) {
+  constexpr double kMostGrowth = 64;  // an estimate from few photons is a rough one
+  const double ratio = RelativeError(result) / wanted;
+  const double growth = std::clamp(1.05 * ratio * ratio, 1.1, kMostGrowth);
+  return static_cast<std::int64_t>(
+      std::min(static_cast<double>(most),
+               std::ceil(growth * static_cast<double>(result.photon_count))));
+}
+
 }  // namespace
 
-MonteCarloTransport::MonteCarloTransport(const Phantom& phantom, const Options& options)
-    : phantom_(phantom), options_(options) {
+double RelativeError(const Totals& totals) {
+  constexpr double kLeast = 0.01;
+  return std::max(totals.reflected_se / std::max(totals.reflected, kLeast),
+                  totals.transmitted_se / std::max(totals.transmitted, kLeast));
+}
+
+Totals ToTotals(const Result& result) {
+  const double absorbed =
+      result.absorbed.mean + result.backing.mean + result.sides.mean;
+  return {.reflected = result.reflected.mean,
+          .transmitted = result.transmitted.mean,
+          .absorbed = absorbed,
+          .reflected_se = result.reflected.se,
+          .transmitted_se = result.transmitted.se,
+          .absorbed_se = BinomialEstimate(absorbed, result.photon_count).se,
+          .photons = result.photon_count};
+}
+
+double RelativeError(const Result& result) {
+  if (result.window_per_mm2.empty()) {
+    return RelativeError(ToTotals(result));
+  }
+  double value = 0;
+  double error = 0;
+  for (const Estimate& cell : result.window_per_mm2) {
+    value += cell.mean;
+    error += cell.se;
+  }
+  return std::sqrt(2 / std::numbers::pi) * error / value;
+}
+
+MonteCarloTransport::MonteCarloTransport(const Phantom& phantom,
+                                         const Options& options,
+                                         const BeamOptions& beam_options,
+                                         const ProgressFunction& progress)
+    : phantom_(phantom),
+      options_(options),
+      beam_options_(beam_options),
+      progress_(progress) {
   nacre::Validate(options);
   for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
     volumes_.push_back(MakeVolume(phantom, c));
@@ -41,30 +143,109 @@ MonteCarloTransport::MonteCarloTransport(const Phantom& phantom, const Options& 
   }
 }
 
+Source MonteCarloTransport::SourceAt(PointMm x_i) const {
+  Source source = MakeSource(phantom_.beam, x_i);
+  source.diffuse = beam_options_.diffuse;
+  return source;
+}
+
+Result MonteCarloTransport::Run(Simulation& simulation,
+                                const ProgressFunction& progress) const {
+  if (!(beam_options_.wanted_error > 0)) {
+    simulation.Add(options_.photon_count, progress);
+    return simulation.Get();
+  }
+  constexpr std::int64_t kPilot = 1 << 16;
+  std::int64_t target = std::min(kPilot, options_.photon_count);
+  std::int64_t done = 0;
+  for (;;) {
+    simulation.Add(target - done, progress);
+    done = target;
+    Result result = simulation.Get();
+    if (RelativeError(result) <= beam_options_.wanted_error ||
+        done >= options_.photon_count) {
+      return result;
+    }
+    target = PhotonsFor(result, beam_options_.wanted_error, options_.photon_count);
+  }
+}
+
 Result MonteCarloTransport::Simulate(PointMm x_i,
                                      std::size_t channel,
                                      const TallyRequest& request,
                                      const ProgressFunction& progress) const {
+  RequireFinite(x_i);
+  const Volume& volume = volumes_[channel];
+  const PointMm near = NearOrigin(volume, x_i);
+  TallyRequest moved = request;
+  moved.window_centre = {near.x + (request.window_centre.x - x_i.x),
+                         near.y + (request.window_centre.y - x_i.y)};
+  return SimulateLight(SourceAt(near), channel, moved, progress);
+}
+
+Result MonteCarloTransport::SimulateLight(const Source& source,
+                                          std::size_t channel,
+                                          const TallyRequest& request,
+                                          const ProgressFunction& progress) const {
   Options options = options_;
-  options.seed = SeedOf(options_.seed, channel, x_i);
-  return monte_carlo::Simulate(
-      volumes_[channel], MakeSource(phantom_.beam, x_i), request, options, progress);
+  options.seed = SeedOf(options_.seed, channel, source.centre);
+  const Volume& volume = volumes_[channel];
+  Simulation simulation(
+      volume, SharedAtBorders(source, volume.pattern), request, options);
+  return Run(simulation, progress ? progress : progress_);
 }
 
 Window MonteCarloTransport::WindowAround(PointMm x_i) const {
+  return WindowAround(x_i, {});
+}
+
+Window MonteCarloTransport::WindowAround(PointMm x_i,
+                                         const ProgressFunction& progress) const {
   Expect(phantom_.grid.points_x > 0, "a phantom with a grid");
   const TallyRequest request{.window_centre = x_i,
                              .window_core = phantom_.grid.core,
                              .window_pitch_mm = phantom_.grid.pitch_mm,
                              .use_symmetry = true};
   Window window;
-  for (std::size_t c = 0; c < volumes_.size(); ++c) {
-    for (const Estimate& cell : Simulate(x_i, c, request).window_per_mm2) {
+  const auto channels = static_cast<std::int64_t>(volumes_.size());
+  for (std::int64_t c = 0; c < channels; ++c) {
+    const auto of_channels = [&](const Progress& state) {
+      return progress({state.stage,
+                       c * state.total + state.done,
+                       channels * state.total,
+                       state.note});
+    };
+    const Result result =
+        Simulate(x_i,
+                 static_cast<std::size_t>(c),
+                 request,
+                 progress ? ProgressFunction(of_channels) : ProgressFunction());
+    for (const Estimate& cell : result.window_per_mm2) {
       window.rd.push_back(static_cast<float>(cell.mean));
       window.sigma.push_back(static_cast<float>(cell.se));
     }
   }
   return window;
+}
+
+void MonteCarloTransport::SolveWindows(
+    std::span<const PointMm> points,
+    const std::function<void(std::size_t k, Window&& window)>& use,
+    const ProgressFunction& progress) const {
+  const auto count = static_cast<std::int64_t>(points.size());
+  for (std::int64_t k = 0; k < count; ++k) {
+    const auto of_points = [&](const Progress& state) {
+      return progress(
+          {state.stage,
+           k * state.total + state.done,
+           count * state.total,
+           "photons, beam " + std::to_string(k + 1) + " of " + std::to_string(count)});
+    };
+    const auto at = static_cast<std::size_t>(k);
+    use(at,
+        WindowAround(points[at],
+                     progress ? ProgressFunction(of_points) : ProgressFunction()));
+  }
 }
 
 void MonteCarloTransport::AddExitance(PointMm x_i,
@@ -125,8 +306,7 @@ double MonteCarloTransport::FindReachMm(std::size_t channel) const {
     Options options = options_;
     options.photon_count = 400'000;
     options.seed = SeedOf(options_.seed, channel, x_i);
-    const Result r =
-        monte_carlo::Simulate(volume, MakeSource(phantom_.beam, x_i), request, options);
+    const Result r = monte_carlo::Simulate(volume, SourceAt(x_i), request, options);
     // Outwards, until the light beyond is little enough to leave out.
     double beyond = r.reflected.mean;
     const double width = request.ring_width_mm;
@@ -151,10 +331,7 @@ double MonteCarloTransport::ReachMm(std::size_t channel) const {
 }
 
 Totals MonteCarloTransport::TotalsAt(PointMm x_i, std::size_t channel) const {
-  const Result r = Simulate(x_i, channel, {});
-  return {.reflected = r.reflected.mean,
-          .transmitted = r.transmitted.mean,
-          .absorbed = r.absorbed.mean + r.backing.mean};
+  return ToTotals(Simulate(x_i, channel, {}));
 }
 
 }  // namespace nacre::rigs::monte_carlo

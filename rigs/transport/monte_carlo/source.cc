@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/fresnel.h"
 
+#include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -10,11 +11,21 @@
 namespace nacre::rigs::monte_carlo {
 namespace {
 
+constexpr double kFarthestMm = 1e5;  // where a float still resolves 0.01 mm
+
+PointMm Choose(const Footprint& footprint, double u) {
+  const auto at =
+      std::upper_bound(footprint.cumulative.begin(), footprint.cumulative.end() - 1, u);
+  return footprint.centres[static_cast<std::size_t>(at - footprint.cumulative.begin())];
+}
+
 void PlaceOnBeam(const Source& source,
                  const std::function<double()>& uniform,
                  Entry& entry) {
-  entry.x_mm = source.centre.x;
-  entry.y_mm = source.centre.y;
+  const PointMm centre =
+      source.footprint ? Choose(*source.footprint, uniform()) : source.centre;
+  entry.x_mm = centre.x;
+  entry.y_mm = centre.y;
   const double width = source.width_mm;
   switch (source.shape) {
     case BeamShape::kPencil:
@@ -51,13 +62,57 @@ double DrawDiffuseSine(double eta, const std::function<double()>& uniform) {
 
 }  // namespace
 
+Footprint MakeFootprint(std::span<const PointMm> centres,
+                        std::span<const double> flux) {
+  Expect(centres.size() == flux.size(), "a flux for each place");
+  Footprint footprint;
+  double sum = 0;
+  for (std::size_t k = 0; k < flux.size(); ++k) {
+    if (!(flux[k] >= 0) || !std::isfinite(flux[k])) {
+      throw BadData(fmt::format(
+          "Monte Carlo: a flux of {} at ({:g}, {:g}) mm; light can't be negative, nor "
+          "infinite",
+          flux[k],
+          centres[k].x,
+          centres[k].y));
+    }
+    if (flux[k] > 0) {
+      sum += flux[k];
+      footprint.centres.push_back(centres[k]);
+      footprint.cumulative.push_back(sum);
+    }
+  }
+  if (!(sum > 0) || !std::isfinite(sum)) {
+    throw BadData(fmt::format(
+        "Monte Carlo: the flux of all places adds up to {}; there must be light, and "
+        "finitely much of it",
+        sum));
+  }
+  for (double& share : footprint.cumulative) {
+    share /= sum;
+  }
+  return footprint;
+}
+
 void Validate(const Source& source) {
-  if (!(source.width_mm >= 0) || !(std::abs(source.angle_rad) < std::numbers::pi / 2)) {
+  const auto near_enough = [](double coordinate_mm) {
+    return std::abs(coordinate_mm) <= kFarthestMm;  // refuses NaN too
+  };
+  if (!(source.width_mm >= 0) || !near_enough(source.width_mm) ||
+      !(std::abs(source.angle_rad) < std::numbers::pi / 2)) {
     throw BadData(
         fmt::format("Monte Carlo: a beam of width {} mm at {} rad; needed are a width "
                     "of at least 0 and an angle below a right one",
                     source.width_mm,
                     source.angle_rad));
+  }
+  if (!near_enough(source.centre.x) || !near_enough(source.centre.y)) {
+    throw BadData(
+        fmt::format("Monte Carlo: a beam at ({:g}, {:g}) mm; positions are single "
+                    "precision, so it must be within {:g} mm of the origin",
+                    source.centre.x,
+                    source.centre.y,
+                    kFarthestMm));
   }
 }
 

@@ -4,8 +4,21 @@
 #include "rigs/transport/monte_carlo/volume.h"
 
 #include <functional>
+#include <memory>
+#include <span>
+#include <vector>
 
 namespace nacre::rigs::monte_carlo {
+
+/// Many places that light enters around, each with its share of the flux.
+struct Footprint {
+  std::vector<PointMm> centres;
+  std::vector<double> cumulative;  ///< shares of the first, the first two, … centres
+};
+
+/// Leaves out places without flux. Throws BadData if a flux is negative or not finite,
+/// or if there is none.
+Footprint MakeFootprint(std::span<const PointMm> centres, std::span<const double> flux);
 
 /// Light that arrives on the top surface.
 struct Source {
@@ -14,6 +27,8 @@ struct Source {
   double width_mm = 0;   ///< as Beam::width_mm, measured on the surface
   double angle_rad = 0;  ///< in air, from the normal, towards +x
   bool diffuse = false;  ///< Lambertian: radiance the same from all directions
+  /// Beams of that shape around all these places instead of `centre`.
+  std::shared_ptr<const Footprint> footprint{};
 };
 
 /// Throws BadData for what can't be lit.

@@ -22,6 +22,9 @@ bool MapsPattern(const Motion& motion, const Pattern& pattern, PointMm centre) {
   if (pattern.type == PatternType::kHomogeneous) {
     return true;
   }
+  if (pattern.type == PatternType::kMixture) {
+    return !motion.exchange && !motion.mirror_x && !motion.mirror_y;
+  }
   const double half_cells_x = 2 * centre.x / pattern.cell_mm;
   const double half_cells_y = 2 * centre.y / pattern.cell_mm;
   if (motion.mirror_x && !IsWhole(half_cells_x)) {
@@ -61,6 +64,7 @@ std::vector<Motion> Symmetries(const Volume& volume, const Source& source) {
   for (int bits = 0; bits < 8; ++bits) {
     const Motion motion{(bits & 1) != 0, (bits & 2) != 0, (bits & 4) != 0};
     const bool maps_volume =
+        (bits == 0 || !source.footprint) &&
         MapsPattern(motion, volume.pattern, source.centre) &&
         (!volume.box || MapsBox(motion, *volume.box, source.centre)) &&
         (!volume.voxels || bits == 0);

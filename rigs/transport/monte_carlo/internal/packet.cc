@@ -131,7 +131,8 @@ Roster::Roster(const PacketJob& job,
                std::int64_t end,
                CountTally& tally)
     : job_(job), next_(begin), end_(end), tally_(tally) {
-  always_same_entry_ = job.source.shape == BeamShape::kPencil && !job.source.diffuse;
+  always_same_entry_ = job.source.shape == BeamShape::kPencil && !job.source.diffuse &&
+                       !job.source.footprint;
   if (always_same_entry_) {
     entry_ = DrawEntry(job.source, *job.volume, [] { return 0.0; });
   }

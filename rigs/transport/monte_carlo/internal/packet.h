@@ -108,7 +108,7 @@ class Roster {
   std::int64_t in_flight_ = 0;
 };
 
-/// Follows photons [begin, end) with the best instruction set.
+/// Follows photons [begin, end), any of them, with the best instruction set.
 void RunPhotons(const PacketJob& job,
                 std::int64_t begin,
                 std::int64_t end,

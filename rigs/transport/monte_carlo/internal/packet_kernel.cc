@@ -14,6 +14,7 @@
 #include "rigs/transport/monte_carlo/internal/packet.h"
 #include "rigs/transport/monte_carlo/threefry.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -489,7 +490,12 @@ void RunPhotons(const PacketJob& job,
                 std::int64_t begin,
                 std::int64_t end,
                 CountTally& tally) {
-  HWY_DYNAMIC_DISPATCH(RunPacket)(job, begin, end, tally);
+  // Lanes share the upper half of their photons' numbers.
+  while (begin < end) {
+    const std::int64_t stop = std::min(end, ((begin >> 32) + 1) << 32);
+    HWY_DYNAMIC_DISPATCH(RunPacket)(job, begin, stop, tally);
+    begin = stop;
+  }
 }
 
 std::vector<std::string> SupportedInstructionSets() {

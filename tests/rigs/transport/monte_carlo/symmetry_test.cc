@@ -62,10 +62,10 @@ TEST(Symmetry, AveragesAreUnbiasedAndLessNoisy) {
     TallyRequest request{
         .window_centre = x_i, .window_core = 21, .window_pitch_mm = 0.25};
     const Source source{.centre = x_i};
-    const Result plain = Simulate(volume, source, request, Photons(400'000, 1));
+    const Result plain = Simulate(volume, source, request, Photons(120'000, 1));
     request.use_symmetry = true;
-    const Result same = Simulate(volume, source, request, Photons(400'000, 1));
-    const Result other = Simulate(volume, source, request, Photons(400'000, 2));
+    const Result same = Simulate(volume, source, request, Photons(120'000, 1));
+    const Result other = Simulate(volume, source, request, Photons(120'000, 2));
     double sum_plain = 0;
     double sum_same = 0;
     double chi2 = 0;
