@@ -31,7 +31,8 @@ Between Locate(const Axis& axis, double at_mm) {
 // The second medium's share of the way from x_i to each column's centre.
 std::vector<double> SharesAtColumns(const Pattern& pattern,
                                     const diffusion::Mesh& mesh,
-                                    PointMm x_i) {
+                                    PointMm x_i,
+                                    double step_mm) {
   std::vector<float> x;
   std::vector<float> y;
   for (int j = 0; j < mesh.y.Count(); ++j) {
@@ -40,8 +41,8 @@ std::vector<double> SharesAtColumns(const Pattern& pattern,
       y.push_back(static_cast<float>(mesh.y.Centre(j)));
     }
   }
-  std::vector<float> share(x.size());
-  pattern.SecondMediumFraction(x_i, {x.data(), y.data(), x.size()}, share.data());
+  const std::vector<float> share =
+      diffusion::SharesOfTheWay(pattern, x_i, {x.data(), y.data(), x.size()}, step_mm);
   return {share.begin(), share.end()};
 }
 
@@ -64,7 +65,8 @@ std::vector<double> DiffusionTransport::Impl::LogRatio(
   mixed.FromDepth(FromDepth());
   AddBeam(channel, scene, place, x_i, 0, mixed);
   mixed.Solve(options.tolerance);
-  const std::vector<double> share = SharesAtColumns(phantom.pattern, scene.mesh, x_i);
+  const std::vector<double> share =
+      SharesAtColumns(phantom.pattern, scene.mesh, x_i, channel.step_mm);
   std::vector<double> logs;
   for (std::size_t c = 0; c < share.size(); ++c) {
     logs.push_back(std::log(std::max(mixed.Exitance(0, c), kDarkest)));
@@ -105,8 +107,8 @@ void DiffusionTransport::AddExitance(PointMm x_i,
   const Impl::Scene scene = impl_->MakeScene(channel, place);
   const std::vector<double> logs = impl_->LogRatio(channel, scene, place, x_i);
   const std::vector<BeamPoint> beam = PointsOf(impl_->phantom.beam, channel.beam);
-  std::vector<float> share(points.count);
-  impl_->phantom.pattern.SecondMediumFraction(x_i, points, share.data());
+  const std::vector<float> share =
+      diffusion::SharesOfTheWay(impl_->phantom.pattern, x_i, points, channel.step_mm);
   const auto nx = static_cast<std::size_t>(scene.nx);
   const auto alone = [&](std::size_t medium, double x, double y) {
     double sum = 0;

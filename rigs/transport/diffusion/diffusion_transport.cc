@@ -224,12 +224,11 @@ void DiffusionTransport::Impl::ReadWindow(
       y.push_back(static_cast<float>(x_i.y + (half - row) * pitch_mm));
     }
   }
-  std::vector<float> fraction(cells);
-  phantom.pattern.SecondMediumFraction(
-      x_i, {x.data(), y.data(), cells}, fraction.data());
+  const std::vector<float> share = diffusion::SharesOfTheWay(
+      phantom.pattern, x_i, {x.data(), y.data(), cells}, channel.step_mm);
   const std::size_t last = channel.setup.substances.size() - 1;
   for (std::size_t cell = 0; cell < cells; ++cell) {
-    const double f = static_cast<double>(fraction[cell]);
+    const double f = static_cast<double>(share[cell]);
     const int col = static_cast<int>(cell % static_cast<std::size_t>(core)) - half;
     const int row = half - static_cast<int>(cell / static_cast<std::size_t>(core));
     double sum = 0;

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace nacre::rigs::diffusion {
@@ -12,6 +13,10 @@ namespace {
 constexpr int kGuardColumns = 3;
 
 }  // namespace
+
+double ExitFromDepth(double eta) {
+  return std::clamp(0.25 + 0.5 * (eta - 1), 0.25, 0.75);
+}
 
 Mesh MakeMesh(const ChannelSetup& setup,
               const DomainLayout& layout,

@@ -15,8 +15,8 @@ class NearField {
  public:
   struct Request {
     double step_mm = 1;
-    int half_columns = 0;     ///< the window's, from the beam's column to its edge
-    double from_depth = 0.5;  ///< LocalDomain::FromDepth()
+    int half_columns = 0;   ///< the window's, from the beam's column to its edge
+    double from_depth = 0;  ///< LocalDomain::FromDepth()
     double tolerance = 1e-6;
   };
   /// `profiles` holds the reference of each substance.

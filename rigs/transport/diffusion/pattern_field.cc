@@ -26,6 +26,24 @@ double Between(const float* fractions, double first_mm, double second_mm) {
 
 }  // namespace
 
+std::vector<float> SharesOfTheWay(const Pattern& pattern,
+                                  PointMm beam,
+                                  const PointColumns& points,
+                                  double step_mm) {
+  const double aside_mm = 1e-3 * step_mm;
+  std::vector<float> mean(points.count);
+  std::vector<float> one(points.count);
+  for (const double sy : {-aside_mm, aside_mm}) {
+    for (const double sx : {-aside_mm, aside_mm}) {
+      pattern.SecondMediumFraction({beam.x + sx, beam.y + sy}, points, one.data());
+      for (std::size_t k = 0; k < mean.size(); ++k) {
+        mean[k] += 0.25F * one[k];
+      }
+    }
+  }
+  return mean;
+}
+
 PatternFractions SampleFractions(const Pattern& pattern, const Mesh& mesh) {
   const auto nx = static_cast<std::size_t>(mesh.x.Count());
   const auto ny = static_cast<std::size_t>(mesh.y.Count());

@@ -19,6 +19,13 @@ struct PatternFractions {
   std::vector<float> north;
 };
 
+/// The second medium's share of the way from a beam to each point. A beam on a border
+/// is on both sides of it: the mean of four beams a thousandth of `step_mm` aside.
+std::vector<float> SharesOfTheWay(const Pattern& pattern,
+                                  PointMm beam,
+                                  const PointColumns& points,
+                                  double step_mm);
+
 PatternFractions SampleFractions(const Pattern& pattern, const Mesh& mesh);
 
 /// σ_a and the vertical D are means by area (of mixtures, 1 / D is). Between two

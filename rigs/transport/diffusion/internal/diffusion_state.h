@@ -34,7 +34,9 @@ struct DiffusionTransport::Impl {
   std::vector<Channel> channels;
 
   /// See LocalDomain::FromDepth().
-  double FromDepth() const { return options.reciprocal_exit ? 1 : 0.5; }
+  double FromDepth() const {
+    return options.reciprocal_exit ? 1 : diffusion::ExitFromDepth(phantom.slab.eta);
+  }
   Channel MakeChannel(std::size_t c, const ReferenceProfile& reference) const;
 
   // A mesh for the beams of one neighbourhood, and what it is filled with.

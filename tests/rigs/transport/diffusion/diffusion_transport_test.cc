@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace nacre::rigs {
@@ -62,19 +63,20 @@ TEST(DiffusionTransport, HomogeneousIsTheExactSolution) {
   }
 }
 
-// Without the correction, i.e. with the mesh's own homogeneous solution as reference,
-// the error is the mesh's: it must fall with the square of its width.
-TEST(DiffusionTransport, MeshConvergesToTheExactSolutionAndIsFineByDefault) {
+// What the default mesh costs beside one three times as fine: 0.6 % rms, most where a
+// border passes close by the beam.
+TEST(DiffusionTransport, MeshIsFineEnoughByDefault) {
   const Phantom chess = Make("chessboard");
   DiffusionOptions fine = Pure();
   fine.step_free_paths = 0.5;
-  fine.first_layer_free_paths = 0.1;
-  fine.layer_growth = 1.15;
+  fine.first_layer_free_paths = 0.13;
+  fine.layer_growth = 1.2;
   const DiffusionTransport normal(chess, Pure());
   const DiffusionTransport finer(chess, fine);
   const PointMm x_i = chess.grid.Point(4, 7);  // 0.75 mm from a border
   const Window a = normal.WindowAround(x_i);
   const Window b = finer.WindowAround(x_i);
+  double squares = 0;
   double worst = 0;
   double worst_far = 0;
   for (int dy = -7; dy <= 7; ++dy) {
@@ -82,10 +84,12 @@ TEST(DiffusionTransport, MeshConvergesToTheExactSolutionAndIsFineByDefault) {
       const double error = std::abs(static_cast<double>(At(a, 15, dx, dy)) /
                                         static_cast<double>(At(b, 15, dx, dy)) -
                                     1);
+      squares += error * error / (15 * 15);
       worst = std::max(worst, error);
       worst_far = std::hypot(dx, dy) > 2.5 ? std::max(worst_far, error) : worst_far;
     }
   }
+  EXPECT_LT(std::sqrt(squares), 0.01);
   EXPECT_LT(worst, 0.03);
   EXPECT_LT(worst_far, 0.02);
 }
@@ -172,6 +176,21 @@ TEST(DiffusionTransport, ReciprocalExitIsSymmetric) {
       static_cast<double>(At(ordinary.WindowAround(in_second), 15, -3, 0));
   EXPECT_GT(std::abs(asymmetry - 1), 0.005);
   EXPECT_LT(std::abs(asymmetry - 1), 0.5);
+}
+
+// A beam on a border belongs to both sides: the picture is the mirrored one, media
+// exchanged.
+TEST(DiffusionTransport, BeamOnABorderIsSharedByBothMedia) {
+  const Phantom phantom = Make("chessboard");
+  Phantom exchanged = phantom;
+  std::swap(exchanged.media[0], exchanged.media[1]);
+  const Window a = DiffusionTransport(phantom, Pure()).WindowAround({0, 1.5});
+  const Window b = DiffusionTransport(exchanged, Pure()).WindowAround({0, 1.5});
+  for (int dy = -7; dy <= 7; ++dy) {
+    for (int dx = -7; dx <= 7; ++dx) {
+      EXPECT_NEAR(At(a, 15, dx, dy) / At(b, 15, -dx, dy), 1, 2e-3) << dx << ' ' << dy;
+    }
+  }
 }
 
 TEST(DiffusionTransport, ThreadsDoNotMatter) {

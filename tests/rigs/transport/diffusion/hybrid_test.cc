@@ -30,7 +30,7 @@ TEST(MonteCarloProfile, IsTheIndependentOne) {
                          .top_factor = a,
                          .bottom_factor = 1});
   const auto profile =
-      MonteCarloProfile(marble, {.last_mm = 12, .photon_count = 2'000'000}, model);
+      MonteCarloProfile(marble, {.last_mm = 12, .photon_count = 1'500'000}, model);
   struct Ring {
     double from_mm;
     double mean;
@@ -78,7 +78,7 @@ TEST(Hybrid, ChessboardIsWithinThreePercentOfMonteCarlo) {
       "test");
   const DiffusionTransport hybrid(phantom, {.reference_photons = 1'000'000});
   const double free_path_mm = 0.5;
-  for (const PointMm x_i : {PointMm{2, 2}, PointMm{6, 2}, PointMm{3.4, 1.8}}) {
+  for (const PointMm x_i : {PointMm{2, 2}, PointMm{3.4, 1.8}}) {
     const Window found = hybrid.WindowAround(x_i);
     const auto truth = monte_carlo::Simulate(monte_carlo::MakeVolume(phantom, 0),
                                              monte_carlo::Source{.centre = x_i},
@@ -86,7 +86,7 @@ TEST(Hybrid, ChessboardIsWithinThreePercentOfMonteCarlo) {
                                               .window_core = 21,
                                               .window_pitch_mm = 0.4,
                                               .use_symmetry = true},
-                                             {.photon_count = 2'000'000, .seed = 77});
+                                             {.photon_count = 1'500'000, .seed = 77});
     constexpr std::array kEdges = {1.0, 1.7, 3.0, 5.0, 8.0};
     for (std::size_t e = 0; e + 1 < kEdges.size(); ++e) {
       double light = 0;
