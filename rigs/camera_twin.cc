@@ -75,22 +75,22 @@ std::optional<acquire::Frame> CameraTwin::Capture(
 
 const std::vector<float>& CameraTwin::Rates() {
   if (!has_rates_ || rates_revision_ != world_->revision) {
-    rates_ = ComputeRates();
+    ComputeRates(rates_);
     rates_revision_ = world_->revision;
     has_rates_ = true;
   }
   return rates_;
 }
 
-std::vector<float> CameraTwin::ComputeRates() const {
+void CameraTwin::ComputeRates(std::vector<float>& rates) const {
   using acquire::Target;
   const auto channel = static_cast<std::size_t>(world_->channel);
   const double flux_mw = model_.spot_flux_mw.at(channel);
-  std::vector<float> rates;
   double scale = model_.lamp_electrons_per_us;
   switch (world_->target) {
     case Target::kNothing:
-      return std::vector<float>(rays_.x.size(), 0.0F);
+      rates.assign(rays_.x.size(), 0.0F);
+      return;
     case Target::kFlat:
       rates.assign(rays_.x.size(), static_cast<float>(model_.card_reflectance));
       break;
@@ -107,14 +107,13 @@ std::vector<float> CameraTwin::ComputeRates() const {
       scale = model_.electrons_per_us_per_radiance[channel];
       break;
     case Target::kSample:
-      rates = laser_view_.OnSample(world_->spots, flux_mw, channel);
+      laser_view_.OnSample(world_->spots, flux_mw, channel, rates);
       scale = model_.electrons_per_us_per_radiance[channel];
       break;
   }
   for (float& rate : rates) {
     rate *= static_cast<float>(scale);
   }
-  return rates;
 }
 
 }  // namespace nacre::rigs

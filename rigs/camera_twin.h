@@ -50,7 +50,7 @@ class CameraTwin final : public acquire::Camera {
   const std::vector<float>& Rates();
 
  private:
-  std::vector<float> ComputeRates() const;
+  void ComputeRates(std::vector<float>& rates) const;
 
   CameraModel model_;
   std::shared_ptr<const World> world_;

@@ -3,10 +3,9 @@
 #include "core/error.h"
 #include "core/fresnel.h"
 #include "core/parallel.h"
-#include "rigs/internal/gauss_legendre.h"
+#include "rigs/laser_tiles.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -15,14 +14,6 @@ namespace nacre::rigs {
 namespace {
 
 constexpr std::int64_t kRowsPerTask = 8;
-
-// The peak of R_d may be narrower than a pixel: within some pixels of a spot the mean
-// over the footprint is taken with a Gauss rule of that many points a side.
-struct NearRule {
-  double radius_px;
-  int order;
-};
-constexpr std::array kNearRules = {NearRule{2.5, 8}, NearRule{14, 2}};
 
 std::vector<float> RadianceFactors(const PinholeCamera& camera,
                                    const PlaneMap& map,
@@ -79,89 +70,40 @@ LaserView::Columns LaserView::Within(int row, PointMm centre, double radius_mm) 
           std::upper_bound(begin, end, static_cast<float>(centre.x + half)) - begin)};
 }
 
-void LaserView::AddSampleSpot(PointMm centre,
-                              double entering_mw,
-                              std::size_t channel,
-                              int row,
-                              float* exitance) const {
-  const Columns all = Within(row, centre, sample_->ReachMm(channel));
-  if (all.begin >= all.end) {
-    return;
-  }
-  const double near_mm = kNearRules.back().radius_px * pixel_mm_;
-  Columns near = Within(row, centre, near_mm);
-  near.begin = std::clamp(near.begin, all.begin, all.end);
-  near.end = std::clamp(near.end, near.begin, all.end);
-  const auto add_plain = [&](int begin, int end) {
-    const std::size_t at = map_.Index(begin, row);
-    if (end > begin) {
-      sample_->AddExitance(
-          centre,
-          channel,
-          entering_mw,
-          {&map_.x[at], &map_.y[at], static_cast<std::size_t>(end - begin)},
-          exitance + begin);
+void LaserView::OnSample(std::span<const Spot> spots,
+                         double flux_mw,
+                         std::size_t channel,
+                         std::vector<float>& radiance) const {
+  const double eta = sample_->phantom().slab.eta;
+  const double reach_mm = sample_->ReachMm(channel);
+  const LaserTiles tiles(map_, *sample_);
+  radiance.resize(map_.x.size());
+  constexpr int kRows = LaserTiles::kBandRows;
+  ParallelFor((map_.height + kRows - 1) / kRows, thread_count_, [&](auto band_index) {
+    const int band = static_cast<int>(band_index);
+    const std::size_t begin = map_.Index(0, band * kRows);
+    const std::size_t end = map_.Index(0, std::min(map_.height, (band + 1) * kRows));
+    std::fill(&radiance[begin], radiance.data() + end, 0.0F);
+    for (const Spot& spot : spots) {
+      tiles.AddSpot(
+          {.centre = spot.centre_mm,
+           .entering_mw = flux_mw * FresnelTransmittance(spot.cos_incidence, eta),
+           .channel = channel,
+           .reach_mm = reach_mm},
+          band,
+          radiance.data());
     }
-  };
-  add_plain(all.begin, near.begin);
-  add_plain(near.end, all.end);
-
-  constexpr std::size_t kMostNodes = 64;
-  std::array<float, kMostNodes> x{};
-  std::array<float, kMostNodes> y{};
-  for (int column = near.begin; column < near.end; ++column) {
-    const std::size_t at = map_.Index(column, row);
-    const double r_px = std::hypot(static_cast<double>(map_.x[at]) - centre.x,
-                                   static_cast<double>(map_.y[at]) - centre.y) /
-                        pixel_mm_;
-    const int order =
-        r_px < kNearRules[0].radius_px ? kNearRules[0].order : kNearRules[1].order;
-    static const internal::GaussRule kFine =
-        internal::GaussLegendre(kNearRules[0].order);
-    static const internal::GaussRule kCoarse =
-        internal::GaussLegendre(kNearRules[1].order);
-    const internal::GaussRule& rule = order == kNearRules[0].order ? kFine : kCoarse;
-    const auto side = static_cast<std::size_t>(order);
-    for (std::size_t b = 0; b < side; ++b) {
-      for (std::size_t a = 0; a < side; ++a) {
-        const PointMm point =
-            map_.At(column, row, 0.5 * rule.node[a], 0.5 * rule.node[b]);
-        x[b * side + a] = static_cast<float>(point.x);
-        y[b * side + a] = static_cast<float>(point.y);
-      }
+    for (std::size_t k = begin; k < end; ++k) {
+      radiance[k] *= radiance_factor_[k];
     }
-    std::array<float, kMostNodes> value{};
-    sample_->AddExitance(
-        centre, channel, entering_mw, {x.data(), y.data(), side * side}, value.data());
-    double mean = 0;
-    for (std::size_t k = 0; k < side * side; ++k) {
-      mean += 0.25 * rule.weight[k % side] * rule.weight[k / side] *
-              static_cast<double>(value[k]);
-    }
-    exitance[column] += static_cast<float>(mean);
-  }
+  });
 }
 
 std::vector<float> LaserView::OnSample(std::span<const Spot> spots,
                                        double flux_mw,
                                        std::size_t channel) const {
-  const double eta = sample_->phantom().slab.eta;
-  std::vector<float> radiance(map_.x.size(), 0.0F);
-  ParallelForBlocks(
-      map_.height, kRowsPerTask, thread_count_, [&](auto begin, auto end) {
-        for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
-          const std::size_t at = map_.Index(0, row);
-          for (const Spot& spot : spots) {
-            const double entering_mw =
-                flux_mw * FresnelTransmittance(spot.cos_incidence, eta);
-            AddSampleSpot(spot.centre_mm, entering_mw, channel, row, &radiance[at]);
-          }
-          for (int column = 0; column < map_.width; ++column) {
-            const std::size_t k = map_.Index(column, row);
-            radiance[k] *= radiance_factor_[k];
-          }
-        }
-      });
+  std::vector<float> radiance;
+  OnSample(spots, flux_mw, channel, radiance);
   return radiance;
 }
 

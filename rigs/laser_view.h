@@ -27,6 +27,12 @@ class LaserView {
                               double flux_mw,
                               std::size_t channel) const;
 
+  /// The same into a picture that is there already, whatever it holds.
+  void OnSample(std::span<const Spot> spots,
+                double flux_mw,
+                std::size_t channel,
+                std::vector<float>& radiance) const;
+
   /// On a diffuse reflector of reflectance ρ: L = ρ E / π.
   std::vector<float> OnReference(std::span<const Spot> spots,
                                  double flux_mw,
@@ -40,11 +46,6 @@ class LaserView {
     int end = 0;  // one past the last; none if not above begin
   };
   Columns Within(int row, PointMm centre, double radius_mm) const;
-  void AddSampleSpot(PointMm centre,
-                     double entering_mw,
-                     std::size_t channel,
-                     int row,
-                     float* exitance) const;
   void AddReferenceSpot(PointMm centre, int row, float* density_per_mm2) const;
 
   PlaneMap map_;

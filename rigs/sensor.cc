@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 namespace nacre::rigs {
 namespace {
@@ -112,6 +114,7 @@ NACRE_SIMD_CLONES void DrawFewElectrons(const float* __restrict mean,
     sum[k] = term[k];
     few[k] = 0.0F;
   }
+  constexpr int kBetweenLooks = 4;
   for (int n = 1; n <= most_electrons; ++n) {
     const float per_n = 1.0F / static_cast<float>(n);
     for (std::size_t k = 0; k < count; ++k) {
@@ -119,22 +122,52 @@ NACRE_SIMD_CLONES void DrawFewElectrons(const float* __restrict mean,
       term[k] *= mean[k] * per_n;
       sum[k] += term[k];
     }
+    if (n % kBetweenLooks == 0) {
+      // Pixels that exceed their sum still: when there are none, none will.
+      std::int32_t open = 0;
+      for (std::size_t k = 0; k < count; ++k) {
+        open |= u[k] > sum[k] && mean[k] < kGaussianAbove ? 1 : 0;
+      }
+      if (open == 0) {
+        break;
+      }
+    }
   }
   for (std::size_t k = 0; k < count; ++k) {
     electrons[k] = mean[k] < kGaussianAbove ? few[k] : electrons[k];
   }
 }
 
+// The largest of those below `limit`, 0 if there is none. Floats that aren't negative
+// are in the order of their bits, and the largest integer is found by blends alone.
+NACRE_SIMD_CLONES float LargestBelow(const float* mean,
+                                     std::size_t count,
+                                     float limit) {
+  std::int32_t largest = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto bits = std::bit_cast<std::int32_t>(mean[k] < limit ? mean[k] : 0.0F);
+    largest = largest > bits ? largest : bits;
+  }
+  return std::bit_cast<float>(largest);
+}
+
 // The number of electrons that a mean below kGaussianAbove exceeds once in 10⁸ pixels
 // or less.
 int MostElectrons(const float* mean, std::size_t count) {
-  float brightest = -1;
+  const float brightest = LargestBelow(mean, count, kGaussianAbove);
+  return brightest > 0
+             ? static_cast<int>(std::ceil(brightest + 6 * std::sqrt(brightest))) + 5
+             : 0;
+}
+
+NACRE_SIMD_CLONES void Means(const float* __restrict rates,
+                             float exposure_us,
+                             float dark,
+                             std::size_t count,
+                             float* __restrict mean) {
   for (std::size_t k = 0; k < count; ++k) {
-    brightest = std::max(brightest, mean[k] < kGaussianAbove ? mean[k] : -1.0F);
+    mean[k] = rates[k] * exposure_us + dark;
   }
-  return brightest < 0
-             ? 0
-             : static_cast<int>(std::ceil(brightest + 6 * std::sqrt(brightest))) + 5;
 }
 
 NACRE_SIMD_CLONES void Convert(const SensorModel& sensor,
@@ -167,10 +200,9 @@ void ExposePiece(const SensorModel& sensor,
   const auto dark =
       static_cast<float>(sensor.dark_electrons_per_us * exposure.exposure_us);
   const std::size_t count = rates.size();
-  for (std::size_t k = 0; k < count; ++k) {
-    mean[k] = rates[k] * exposure_us + dark;
-  }
-  if (*std::max_element(mean, mean + count) >= kGaussianAbove) {
+  Means(rates.data(), exposure_us, dark, count, mean);
+  constexpr float kNoLimit = std::numeric_limits<float>::infinity();
+  if (LargestBelow(mean, count, kNoLimit) >= kGaussianAbove) {
     DrawElectrons(mean,
                   draws.photon,
                   static_cast<float>(sensor.full_well_electrons),

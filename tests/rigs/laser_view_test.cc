@@ -113,6 +113,57 @@ TEST(LaserView, SampleSpotsKeepTheEnergy) {
   }
 }
 
+// Tiles stand for their pixels, borders of media and of the picture included: pixel by
+// pixel the model itself, everywhere but where a pixel is a mean over its footprint.
+TEST(LaserView, TilesAreTheModelAtEachPixel) {
+  PinholeCamera camera = TestCamera();
+  camera.width_px = 171;  // not a number of whole tiles
+  camera.height_px = 140;
+  const PlaneMap map = MapSample(camera);
+  for (const PatternType type :
+       {PatternType::kHomogeneous, PatternType::kChessboard, PatternType::kStripes}) {
+    const Phantom phantom =
+        Lit(type == PatternType::kHomogeneous ? testing::Homogeneous(0.0021, 2.19, 10)
+                                              : testing::TwoMarbles(type, 9),
+            0.12);
+    const auto model = std::make_shared<PathAveraged>(phantom);
+    const LaserView view(camera, model, 0.12);
+    for (const PointMm centre : {PointMm{0.4, -1.3}, {-14, 11}, {40, 3}}) {
+      const std::vector<float> seen = view.OnSample(std::vector{Spot{centre, 1}}, 1, 0);
+      std::vector<float> exitance(map.x.size(), 0.0F);
+      model->AddExitance(centre,
+                         0,
+                         FresnelTransmittance(1, 1.5),
+                         {map.x.data(), map.y.data(), map.x.size()},
+                         exitance.data());
+      double worst = 0;
+      double sum2 = 0;
+      double count = 0;
+      for (std::size_t k = 0; k < seen.size(); ++k) {
+        const double r = std::hypot(static_cast<double>(map.x[k]) - centre.x,
+                                    static_cast<double>(map.y[k]) - centre.y);
+        if (r < 15 * map.PixelSize() || r > model->ReachMm(0)) {
+          continue;
+        }
+        const Vector3 eye = camera.Position();
+        const double cosine =
+            eye[2] / std::hypot(eye[0] - static_cast<double>(map.x[k]),
+                                eye[1] - static_cast<double>(map.y[k]),
+                                eye[2]);
+        const double expected = static_cast<double>(exitance[k]) *
+                                FresnelTransmittance(cosine, 1.5) /
+                                (std::numbers::pi * ExitNormalization(1.5));
+        const double error = static_cast<double>(seen[k]) / expected - 1;
+        worst = std::max(worst, std::abs(error));
+        sum2 += error * error;
+        count += 1;
+      }
+      EXPECT_LT(worst, 0.02) << Name(type);
+      EXPECT_LT(std::sqrt(sum2 / count), 6e-4) << Name(type);
+    }
+  }
+}
+
 TEST(LaserView, LightAddsUp) {
   const PinholeCamera camera = TestCamera();
   const auto model = std::make_shared<PathAveraged>(
