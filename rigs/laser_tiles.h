@@ -47,6 +47,7 @@ class LaserTiles {
                  float* exitance) const;
   void AddPixels(const TileSpot& spot, Scratch& scratch, float* exitance) const;
   double Distance(const Tile& tile, PointMm centre) const;
+  double BandDistance(int band, PointMm centre) const;
 
   const PlaneMap& map_;
   const Transport& sample_;
