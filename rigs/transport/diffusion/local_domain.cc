@@ -15,7 +15,7 @@ constexpr int kGuardColumns = 3;
 }  // namespace
 
 double ExitFromDepth(double eta) {
-  return std::clamp(0.25 + 0.5 * (eta - 1), 0.25, 0.75);
+  return std::clamp(0.25 + 0.4 * (eta - 1), 0.25, 0.75);
 }
 
 Mesh MakeMesh(const ChannelSetup& setup,
