@@ -79,14 +79,14 @@ double DiffusionError(const Traits& traits, Quantity quantity) {
   const bool fine = traits.pitch < 2;
   const bool coarse = traits.pitch >= 5;
   if (quantity == Quantity::kWindow) {
-    return Look(!traits.mixed ? ByAlbedo{0.01, 0.01, 0.01}
-                : fine        ? ByAlbedo{0.04, 0.11, kUnknown}
-                : coarse      ? ByAlbedo{0.015, 0.03, kUnknown}
-                              : ByAlbedo{0.026, 0.066, kUnknown},
+    return Look(!traits.mixed ? ByAlbedo{0.01, 0.01, 0.012}
+                : fine        ? ByAlbedo{0.04, 0.12, kUnknown}
+                : coarse      ? ByAlbedo{0.035, 0.11, kUnknown}
+                              : ByAlbedo{0.035, 0.11, kUnknown},
                 traits.albedo);
   }
-  return Look(fine           ? ByAlbedo{0.23, 0.16, 0.16}
-              : traits.mixed ? ByAlbedo{0.055, 0.16, kUnknown}
+  return Look(fine           ? ByAlbedo{0.23, 0.17, 0.16}
+              : traits.mixed ? ByAlbedo{0.055, 0.17, kUnknown}
                              : ByAlbedo{0.045, 0.045, 0.06},
               traits.albedo);
 }
