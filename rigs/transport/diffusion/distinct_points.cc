@@ -2,7 +2,6 @@
 
 #include "core/error.h"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -14,8 +13,8 @@ namespace {
 constexpr double kSame = 1e-6;  // of a cell
 
 // Where a point lies in its pattern: the medium of its cell and its distances from the
-// cell's borders, at most 1/2 (or blind) each, in cells; and which symmetry takes the
-// canonical point's window to this one's.
+// cell's borders, at most 1/2 each, in cells; and which symmetry takes the canonical
+// point's window to this one's.
 struct Place {
   std::array<long, 3> key{};
   WindowSymmetry from_canonical;
@@ -29,7 +28,7 @@ struct Along {
   bool mirrored = false;
 };
 
-Along Locate(double position_mm, double cell_mm, double blind_mm) {
+Along Locate(double position_mm, double cell_mm) {
   Along along;
   double u = position_mm / cell_mm;
   // A point that is on a border but for rounding is on it.
@@ -40,8 +39,7 @@ Along Locate(double position_mm, double cell_mm, double blind_mm) {
   along.cell = std::lround(cell);
   const double within = u - cell;
   along.mirrored = within > 0.5;
-  along.distance =
-      std::min(along.mirrored ? 1 - within : within, std::min(0.5, blind_mm / cell_mm));
+  along.distance = along.mirrored ? 1 - within : within;
   return along;
 }
 
@@ -53,9 +51,9 @@ bool IsOdd(long cell) {
   return cell % 2 != 0;
 }
 
-Place ChessboardPlace(PointMm point, double cell_mm, double blind_mm) {
-  const Along x = Locate(point.x, cell_mm, blind_mm);
-  const Along y = Locate(point.y, cell_mm, blind_mm);
+Place ChessboardPlace(PointMm point, double cell_mm) {
+  const Along x = Locate(point.x, cell_mm);
+  const Along y = Locate(point.y, cell_mm);
   bool second = IsOdd(x.cell) != IsOdd(y.cell);
   Place place;
   place.from_canonical.mirror_x = x.mirrored;
@@ -79,8 +77,8 @@ Place ChessboardPlace(PointMm point, double cell_mm, double blind_mm) {
   return place;
 }
 
-Place StripePlace(PointMm point, double cell_mm, double blind_mm) {
-  const Along x = Locate(point.x, cell_mm, blind_mm);
+Place StripePlace(PointMm point, double cell_mm) {
+  const Along x = Locate(point.x, cell_mm);
   bool second = IsOdd(x.cell);
   Place place;
   place.from_canonical.mirror_x = x.mirrored;
@@ -93,14 +91,14 @@ Place StripePlace(PointMm point, double cell_mm, double blind_mm) {
   return place;
 }
 
-Place PlaceOf(const Pattern& pattern, PointMm point, long index, double blind_mm) {
+Place PlaceOf(const Pattern& pattern, PointMm point, long index) {
   switch (pattern.type) {
     case PatternType::kHomogeneous:
       return {};
     case PatternType::kChessboard:
-      return ChessboardPlace(point, pattern.cell_mm, blind_mm);
+      return ChessboardPlace(point, pattern.cell_mm);
     case PatternType::kStripes:
-      return StripePlace(point, pattern.cell_mm, blind_mm);
+      return StripePlace(point, pattern.cell_mm);
     case PatternType::kMixture:
       return {.key = {index, 0, 0}, .from_canonical = {}};  // no symmetry is known
   }
@@ -126,9 +124,7 @@ WindowSymmetry Compose(const WindowSymmetry& a, const WindowSymmetry& b) {
 }  // namespace
 
 DistinctPoints FindDistinctPoints(const Pattern& pattern,
-                                  const acquire::GridDescription& grid,
-                                  double blind_mm) {
-  Expect(blind_mm > 0, "a positive distance of sight");
+                                  const acquire::GridDescription& grid) {
   struct First {
     std::uint32_t index;
     WindowSymmetry from_canonical;
@@ -139,7 +135,7 @@ DistinctPoints FindDistinctPoints(const Pattern& pattern,
     for (int i = 0; i < grid.points_x; ++i) {
       const PointMm point = grid.Point(i, j);
       const auto index = static_cast<long>(distinct.of.size());
-      const Place place = PlaceOf(pattern, point, index, blind_mm);
+      const Place place = PlaceOf(pattern, point, index);
       const auto [at, is_new] =
           seen.try_emplace(place.key,
                            First{static_cast<std::uint32_t>(distinct.points.size()),

@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 namespace nacre::rigs::diffusion {
@@ -31,13 +30,8 @@ struct DistinctPoints {
 /// axis or one along both, mirrors about a cell's middle, transposition; stripes:
 /// shifts along y, by two stripes along x, mirrors; homogeneous: one point is all;
 /// mixtures: every point is distinct.
-///
-/// `blind_mm`: a border farther than that from x_i along an axis is taken not to matter
-/// (not to exist, if nothing beyond it is simulated). Infinity: exact symmetries only.
-DistinctPoints FindDistinctPoints(
-    const Pattern& pattern,
-    const acquire::GridDescription& grid,
-    double blind_mm = std::numeric_limits<double>::infinity());
+DistinctPoints FindDistinctPoints(const Pattern& pattern,
+                                  const acquire::GridDescription& grid);
 
 /// `window` (channels · core · core) put through the symmetry.
 Window Transformed(const Window& window, int core, const WindowSymmetry& symmetry);

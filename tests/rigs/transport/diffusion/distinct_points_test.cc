@@ -41,15 +41,6 @@ TEST(DistinctPoints, UnalignedChessboardNeedsAQuarter) {
   EXPECT_EQ(distinct.points.size(), (277U * 277U + 2U * 277U + 1U) / 4U);
 }
 
-TEST(DistinctPoints, BlindnessMergesPointsFarFromBorders) {
-  const Pattern pattern{PatternType::kChessboard, 20};
-  const auto all = FindDistinctPoints(pattern, Grid(80, 0.5, 3));
-  const auto blind = FindDistinctPoints(pattern, Grid(80, 0.5, 3), 3);
-  // 20 distances to a border of which the ones beyond 3 mm are alike: 6 + 1.
-  EXPECT_EQ(all.points.size(), 2U * (20U * 21U / 2U));
-  EXPECT_EQ(blind.points.size(), 2U * (7U * 8U / 2U));
-}
-
 TEST(DistinctPoints, StripesRepeatAlongY) {
   const Pattern pattern{PatternType::kStripes, 3};
   const auto distinct = FindDistinctPoints(pattern, Grid(24, 0.5, 3));
