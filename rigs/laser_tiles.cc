@@ -113,6 +113,7 @@ struct LaserTiles::Scratch {
   std::vector<Tile> large;
   std::vector<Tile> small;
   std::vector<Tile> quarters;      // of large ones that aren't smooth
+  std::vector<std::size_t> rough;  // corners of small ones that aren't either
   std::vector<std::size_t> pixel;  // to be computed by themselves
   std::vector<std::size_t> near_pixel;
   std::vector<int> near_order;
@@ -228,10 +229,35 @@ void LaserTiles::AddSmooth(const TileSpot& spot,
             {tile.column + n % 2 * kSmall, tile.row + n / 2 * kSmall, kSmall});
       }
     } else {
-      for (int row = 0; row < tile.size; ++row) {
-        for (int column = 0; column < tile.size; ++column) {
-          scratch.pixel.push_back(map_.Index(tile.column + column, tile.row + row));
-        }
+      scratch.rough.push_back(map_.Index(tile.column, tile.row));
+    }
+  }
+}
+
+// Small tiles pixel by pixel, all of them far enough from the spot for a pixel to be a
+// point.
+void LaserTiles::AddRough(const TileSpot& spot,
+                          Scratch& scratch,
+                          float* exitance) const {
+  constexpr auto kSide = static_cast<std::size_t>(kSmall);
+  const auto width = static_cast<std::size_t>(map_.width);
+  const std::size_t points = scratch.rough.size() * kSide * kSide;
+  scratch.x.resize(points);
+  scratch.y.resize(points);
+  std::size_t at = 0;
+  for (const std::size_t corner : scratch.rough) {
+    for (std::size_t row = 0; row < kSide; ++row, at += kSide) {
+      std::copy_n(&map_.x[corner + row * width], kSide, &scratch.x[at]);
+      std::copy_n(&map_.y[corner + row * width], kSide, &scratch.y[at]);
+    }
+  }
+  scratch.Evaluate(sample_, spot);
+  at = 0;
+  for (const std::size_t corner : scratch.rough) {
+    for (std::size_t row = 0; row < kSide; ++row, at += kSide) {
+      float* const out = exitance + corner + row * width;
+      for (std::size_t k = 0; k < kSide; ++k) {
+        out[k] += scratch.value[at + k];
       }
     }
   }
@@ -298,6 +324,7 @@ void LaserTiles::AddSpot(const TileSpot& spot, int band, float* exitance) const 
   scratch.large.clear();
   scratch.small.clear();
   scratch.quarters.clear();
+  scratch.rough.clear();
   scratch.pixel.clear();
   const int first_row = band * kBandRows;
   const int rows = std::min(kBandRows, map_.height - first_row);
@@ -336,6 +363,7 @@ void LaserTiles::AddSpot(const TileSpot& spot, int band, float* exitance) const 
   scratch.small.insert(
       scratch.small.end(), scratch.quarters.begin(), scratch.quarters.end());
   AddSmooth(spot, scratch.small, scratch, exitance);
+  AddRough(spot, scratch, exitance);
   AddPixels(spot, scratch, exitance);
 }
 

@@ -45,6 +45,7 @@ class LaserTiles {
                  const std::vector<Tile>& tiles,
                  Scratch& scratch,
                  float* exitance) const;
+  void AddRough(const TileSpot& spot, Scratch& scratch, float* exitance) const;
   void AddPixels(const TileSpot& spot, Scratch& scratch, float* exitance) const;
   double Distance(const Tile& tile, PointMm centre) const;
   double BandDistance(int band, PointMm centre) const;
