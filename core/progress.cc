@@ -10,4 +10,18 @@ void Report(const ProgressFunction& progress, const Progress& state) {
   }
 }
 
+ProgressFunction PartOf(const ProgressFunction& progress,
+                        std::int64_t part,
+                        std::int64_t part_count) {
+  if (!progress) {
+    return {};
+  }
+  return [&progress, part, part_count](const Progress& state) {
+    return progress({state.stage,
+                     part * state.total + state.done,
+                     part_count * state.total,
+                     state.note});
+  };
+}
+
 }  // namespace nacre

@@ -20,4 +20,11 @@ using ProgressFunction = std::function<bool(const Progress&)>;
 /// Reports and throws Interrupted if the answer is to stop. An empty function is fine.
 void Report(const ProgressFunction& progress, const Progress& state);
 
+/// For work in `part_count` equal parts, each of which reports its own progress: that
+/// of part number `part`, seen as progress of the whole. Empty if `progress` is. It
+/// refers to `progress`, which has to outlive it.
+ProgressFunction PartOf(const ProgressFunction& progress,
+                        std::int64_t part,
+                        std::int64_t part_count);
+
 }  // namespace nacre

@@ -182,7 +182,13 @@ Photo PhotographByPhotons(const Phantom& by_pixel,
     if (sum == 0) {
       continue;  // a dark channel is black
     }
-    const monte_carlo::Result r = FollowPhotons(*transport, c, flux, progress);
+    const monte_carlo::Result r =
+        FollowPhotons(*transport,
+                      c,
+                      flux,
+                      PartOf(progress,
+                             static_cast<std::int64_t>(c),
+                             static_cast<std::int64_t>(channels.size())));
     const double entered = (1 - r.specular) * sum;
     const auto core =
         static_cast<std::size_t>(std::max(illumination.width, illumination.height) | 1);

@@ -77,11 +77,9 @@ double FastError(const Traits& traits, Quantity quantity) {
 // Homogeneous windows are Monte Carlo's own profiles, to 1 % of noise.
 double DiffusionError(const Traits& traits, Quantity quantity) {
   const bool fine = traits.pitch < 2;
-  const bool coarse = traits.pitch >= 5;
   if (quantity == Quantity::kWindow) {
     return Look(!traits.mixed ? ByAlbedo{0.01, 0.01, 0.012}
                 : fine        ? ByAlbedo{0.04, 0.12, kUnknown}
-                : coarse      ? ByAlbedo{0.035, 0.11, kUnknown}
                               : ByAlbedo{0.035, 0.11, kUnknown},
                 traits.albedo);
   }

@@ -209,17 +209,8 @@ Window MonteCarloTransport::WindowAround(PointMm x_i,
   Window window;
   const auto channels = static_cast<std::int64_t>(volumes_.size());
   for (std::int64_t c = 0; c < channels; ++c) {
-    const auto of_channels = [&](const Progress& state) {
-      return progress({state.stage,
-                       c * state.total + state.done,
-                       channels * state.total,
-                       state.note});
-    };
-    const Result result =
-        Simulate(x_i,
-                 static_cast<std::size_t>(c),
-                 request,
-                 progress ? ProgressFunction(of_channels) : ProgressFunction());
+    const Result result = Simulate(
+        x_i, static_cast<std::size_t>(c), request, PartOf(progress, c, channels));
     for (const Estimate& cell : result.window_per_mm2) {
       window.rd.push_back(static_cast<float>(cell.mean));
       window.sigma.push_back(static_cast<float>(cell.se));
@@ -234,17 +225,8 @@ void MonteCarloTransport::SolveWindows(
     const ProgressFunction& progress) const {
   const auto count = static_cast<std::int64_t>(points.size());
   for (std::int64_t k = 0; k < count; ++k) {
-    const auto of_points = [&](const Progress& state) {
-      return progress(
-          {state.stage,
-           k * state.total + state.done,
-           count * state.total,
-           "photons, beam " + std::to_string(k + 1) + " of " + std::to_string(count)});
-    };
     const auto at = static_cast<std::size_t>(k);
-    use(at,
-        WindowAround(points[at],
-                     progress ? ProgressFunction(of_points) : ProgressFunction()));
+    use(at, WindowAround(points[at], PartOf(progress, k, count)));
   }
 }
 
