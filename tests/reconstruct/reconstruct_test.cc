@@ -10,6 +10,7 @@
 #include "reconstruct/rd_dataset.h"
 #include "rigs/simulated_rig.h"
 #include "rigs/transport/transport.h"
+#include "tests/support/error_message.h"
 #include "tests/support/temp_folder.h"
 
 #include <gmock/gmock.h>
@@ -22,6 +23,7 @@
 namespace nacre::reconstruct {
 namespace {
 
+using nacre::testing::ErrorMessage;
 using ::testing::HasSubstr;
 
 constexpr const char* kRig = R"(kind = "simulated"
@@ -253,29 +255,22 @@ TEST_F(ReconstructTest, BytesDependOnNeitherThreadsNorMemory) {
   }
 }
 
-std::string ErrorOf(const std::function<void()>& call) {
-  try {
-    call();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadData);
-    return e.what();
-  }
-  return "no error";
-}
-
 TEST_F(ReconstructTest, TheCalibrationMustBeOfTheSameRig) {
   calibrate::Calibration other = shared->calibration;
   other.session_rig_hash = "another";
-  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
-              HasSubstr("calibration is of rig another"));
+  EXPECT_THAT(
+      ErrorMessage([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+      HasSubstr("calibration is of rig another"));
   other = shared->calibration;
   other.camera.width_px = 7;
-  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
-              HasSubstr("200 x 200 pixels, the calibrated camera 7 x 200"));
+  EXPECT_THAT(
+      ErrorMessage([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+      HasSubstr("200 x 200 pixels, the calibrated camera 7 x 200"));
   other = shared->calibration;
   other.channels.pop_back();
-  EXPECT_THAT(ErrorOf([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
-              HasSubstr("2 laser channels, the calibration has 1"));
+  EXPECT_THAT(
+      ErrorMessage([&] { Reconstruct(Session(), other, Path("y.rd.exr"), {}); }),
+      HasSubstr("2 laser channels, the calibration has 1"));
   EXPECT_FALSE(std::filesystem::exists(Path("y.rd.exr")));
 }
 
@@ -287,7 +282,7 @@ TEST_F(ReconstructTest, MissingPicturesAreNamed) {
       cut / "journal",
       std::string_view(journal).substr(0, journal.rfind('\n', journal.size() - 2) + 1));
   EXPECT_THAT(
-      ErrorOf([&] {
+      ErrorMessage([&] {
         Reconstruct(
             acquire::SessionReader(cut), shared->calibration, Path("y.rd.exr"), {});
       }),

@@ -2,6 +2,7 @@
 #include "core/error.h"
 #include "render/obj.h"
 #include "render/ply.h"
+#include "tests/support/error_message.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,24 +13,15 @@
 namespace nacre::render {
 namespace {
 
+using nacre::testing::ErrorMessage;
 using ::testing::HasSubstr;
 
-std::string MessageOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadData);
-    return e.what();
-  }
-  return "no error";
-}
-
 std::string ObjError(const std::string& text) {
-  return MessageOf([&] { ParseObj(text, "m.obj"); });
+  return ErrorMessage([&] { ParseObj(text, "m.obj"); });
 }
 
 std::string PlyError(const std::string& bytes) {
-  return MessageOf([&] { ParsePly(bytes, "m.ply"); });
+  return ErrorMessage([&] { ParsePly(bytes, "m.ply"); });
 }
 
 TEST(ObjTest, ReadsPolygonsWithAllAttributesAndSharesVertices) {
@@ -204,7 +196,7 @@ TEST(PlyTest, NotANumberIsFoundByTheMeshCheck) {
   std::string text = AsciiQuad();
   text.replace(text.find("1 1 7"), 5, "1 nan 7");
   TriangleMesh mesh = ParsePly(text, "m.ply");
-  EXPECT_THAT(MessageOf([&] { CheckMesh(mesh, "m.ply"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(mesh, "m.ply"); }),
               HasSubstr("position of vertex 2 isn't finite"));
 }
 

@@ -6,6 +6,7 @@
 #include "render/gzip.h"
 #include "render/mesh_file.h"
 #include "render/off.h"
+#include "tests/support/error_message.h"
 #include "tests/support/temp_folder.h"
 
 #include <gmock/gmock.h>
@@ -22,21 +23,12 @@
 namespace nacre::render {
 namespace {
 
+using nacre::testing::ErrorMessage;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-std::string MessageOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadData);
-    return e.what();
-  }
-  return "no error";
-}
-
 std::string OffError(const std::string& text) {
-  return MessageOf([&] { ParseOff(text, "m.off"); });
+  return ErrorMessage([&] { ParseOff(text, "m.off"); });
 }
 
 std::string Gzip(const std::string& text) {
@@ -90,14 +82,14 @@ TEST(GunzipTest, UnpacksAndConcatenates) {
 TEST(GunzipTest, DamageAndBombsAreRefused) {
   const std::string whole = Gzip(kQuad);
   for (const std::size_t size : {std::size_t{0}, std::size_t{5}, whole.size() - 1}) {
-    EXPECT_THAT(MessageOf([&] { Gunzip(whole.substr(0, size), "a.gz"); }),
+    EXPECT_THAT(ErrorMessage([&] { Gunzip(whole.substr(0, size), "a.gz"); }),
                 HasSubstr("a.gz: damaged or cut short"))
         << size;
   }
   std::string changed = whole;
   changed[whole.size() - 6] = static_cast<char>(changed[whole.size() - 6] ^ 1);
-  EXPECT_THAT(MessageOf([&] { Gunzip(changed, "a.gz"); }), HasSubstr("damaged"));
-  EXPECT_THAT(MessageOf([&] { Gunzip(Gzip(std::string(9999, 'n')), "a.gz", 1000); }),
+  EXPECT_THAT(ErrorMessage([&] { Gunzip(changed, "a.gz"); }), HasSubstr("damaged"));
+  EXPECT_THAT(ErrorMessage([&] { Gunzip(Gzip(std::string(9999, 'n')), "a.gz", 1000); }),
               HasSubstr("more than 1000 bytes"));
 }
 
@@ -231,7 +223,7 @@ TEST(PrepareMeshTest, RefusesWhatHasNoWidthAndBadOptions) {
   flat.positions = {{0, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   const MeshPrepareOptions unturned{.widest_across = false};
   flat.triangles = {{0, 1, 2}};
-  EXPECT_THAT(MessageOf([&] { PrepareMesh(flat, unturned); }),
+  EXPECT_THAT(ErrorMessage([&] { PrepareMesh(flat, unturned); }),
               HasSubstr("no width in x"));
   TriangleMesh cube = MakeCube();
   EXPECT_THAT([&] { PrepareMesh(cube, {.up = "w"}); },

@@ -1,6 +1,7 @@
 #include "render/mesh.h"
 
 #include "core/error.h"
+#include "tests/support/error_message.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,17 +12,8 @@
 namespace nacre::render {
 namespace {
 
+using nacre::testing::ErrorMessage;
 using ::testing::HasSubstr;
-
-std::string MessageOf(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& e) {
-    EXPECT_EQ(e.code(), ExitCode::kBadData);
-    return e.what();
-  }
-  return "no error";
-}
 
 TEST(MeshTest, AreasOfTheBuiltInShapesAreTheTextbooks) {
   EXPECT_NEAR(SurfaceArea(MakeRectangle()), 4, 1e-6);
@@ -86,26 +78,27 @@ TEST(MeshTest, RejectsWhatIsNotAMesh) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   TriangleMesh bad_index = MakeRectangle();
   bad_index.triangles[1][2] = 4;
-  EXPECT_THAT(MessageOf([&] { CheckMesh(bad_index, "a.obj"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(bad_index, "a.obj"); }),
               HasSubstr("a.obj: a face uses vertex 4, but there are only 4"));
   TriangleMesh bad_position = MakeRectangle();
   bad_position.positions[3].y = nan;
-  EXPECT_THAT(MessageOf([&] { CheckMesh(bad_position, "a.obj"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(bad_position, "a.obj"); }),
               HasSubstr("position of vertex 3 isn't finite"));
   TriangleMesh bad_uv = MakeRectangle();
   bad_uv.uvs[0].x = std::numeric_limits<float>::infinity();
-  EXPECT_THAT(MessageOf([&] { CheckMesh(bad_uv, "a.obj"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(bad_uv, "a.obj"); }),
               HasSubstr("texture coordinate of vertex 0"));
   TriangleMesh bad_normal = MakeRectangle();
   bad_normal.normals[1].z = nan;
-  EXPECT_THAT(MessageOf([&] { CheckMesh(bad_normal, "a.obj"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(bad_normal, "a.obj"); }),
               HasSubstr("normal of vertex 1"));
   TriangleMesh bad_count = MakeRectangle();
   bad_count.uvs.pop_back();
-  EXPECT_THAT(MessageOf([&] { CheckMesh(bad_count, "a.obj"); }),
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(bad_count, "a.obj"); }),
               HasSubstr("3 texture coordinates for 4 vertices"));
   TriangleMesh empty;
-  EXPECT_THAT(MessageOf([&] { CheckMesh(empty, "a.obj"); }), HasSubstr("no triangle"));
+  EXPECT_THAT(ErrorMessage([&] { CheckMesh(empty, "a.obj"); }),
+              HasSubstr("no triangle"));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include "rigs/transport/monte_carlo/monte_carlo.h"
 #include "tests/rigs/transport/monte_carlo/reference_totals.h"
 #include "tests/rigs/transport/monte_carlo/support.h"
+#include "tests/support/error_message.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,14 +16,7 @@
 namespace nacre::rigs::monte_carlo {
 namespace {
 
-std::string MessageOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing was thrown";
-}
+using nacre::testing::ErrorMessage;
 
 TEST(Volume, RefusesWhatMakesNoSense) {
   struct Bad {
@@ -87,20 +81,21 @@ TEST(Volume, RefusesWhatMakesNoSense) {
     Volume volume = Slab({0.1, 1, 0}, 1, 1.3);
     volume.media.push_back({0.2, 1, 0});
     bad.spoil(volume);
-    EXPECT_THAT(MessageOf([&] { Validate(volume); }), testing::HasSubstr(bad.expected));
+    EXPECT_THAT(ErrorMessage([&] { Validate(volume); }),
+                ::testing::HasSubstr(bad.expected));
   }
 }
 
 TEST(Volume, SimulateRefusesBadRequests) {
   const Volume volume = Slab({0.1, 1, 0}, 1, 1.3);
-  EXPECT_THAT(MessageOf([&] { Simulate(volume, {.width_mm = -1}, {}, {}); }),
-              testing::HasSubstr("a beam of width -1"));
-  EXPECT_THAT(MessageOf([&] { Simulate(volume, {.angle_rad = 1.6}, {}, {}); }),
-              testing::HasSubstr("below a right one"));
-  EXPECT_THAT(MessageOf([&] { Simulate(volume, {}, {.window_core = 3}, {}); }),
-              testing::HasSubstr("needs a size greater than 0"));
-  EXPECT_THAT(MessageOf([&] { Simulate(volume, {}, {}, {.photon_count = 0}); }),
-              testing::HasSubstr("photon_count"));
+  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {.width_mm = -1}, {}, {}); }),
+              ::testing::HasSubstr("a beam of width -1"));
+  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {.angle_rad = 1.6}, {}, {}); }),
+              ::testing::HasSubstr("below a right one"));
+  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {}, {.window_core = 3}, {}); }),
+              ::testing::HasSubstr("needs a size greater than 0"));
+  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {}, {}, {.photon_count = 0}); }),
+              ::testing::HasSubstr("photon_count"));
 }
 
 TEST(Volume, ComesFromAPhantom) {
