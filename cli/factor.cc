@@ -27,6 +27,14 @@ std::string Text(const factor::FactorSummary& summary,
                         summary.a[c],
                         summary.b[c]);
   }
+  if (summary.bits < 32) {
+    text += fmt::format(
+        "\n  rounded to {} bits, which adds {:.2g} % to the error and {:.2g} % to the "
+        "log error",
+        summary.bits,
+        100 * summary.added_l2,
+        100 * summary.added_log);
+  }
   text += fmt::format(
       "\n  worst slice ({}, {}): {:.3g} %; slice totals within {:.1e}; {} passes over "
       "the "

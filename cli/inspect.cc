@@ -142,6 +142,8 @@ Json InspectMaterial(const std::filesystem::path& path) {
           {"window_mm", material.core * material.pitch_mm},
           {"eta", material.eta},
           {"channels", material.channels},
+          {"form", factor::Name(material.form)},
+          {"rounded", !material.steps.empty()},
           {"storage_bytes", material.StorageBytes()},
           {"error", material.error},
           {"checksums", "verified"},

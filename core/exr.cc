@@ -6,6 +6,7 @@
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
 #include <OpenEXR/ImfHeader.h>
+#include <OpenEXR/ImfIO.h>
 #include <OpenEXR/ImfInputPart.h>
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfMultiPartOutputFile.h>
@@ -14,22 +15,36 @@
 #include <OpenEXR/ImfStringAttribute.h>
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 
 namespace nacre {
 namespace {
 
+Imf::PixelType TypeOf(ExrPixels pixels) {
+  switch (pixels) {
+    case ExrPixels::kHalf:
+      return Imf::HALF;
+    case ExrPixels::kCodes:
+      return Imf::UINT;
+    case ExrPixels::kFloat:
+      break;
+  }
+  return Imf::FLOAT;
+}
+
 // All parts of a file share one display window, so that of the first serves for all.
 Imf::Header HeaderOf(const ExrPart& part, const ExrPart& first) {
   Imf::Header header(first.width, first.height);
   header.dataWindow() = Imath::Box2i({0, 0}, {part.width - 1, part.height - 1});
-  header.compression() = Imf::ZIP_COMPRESSION;
+  header.compression() =
+      part.pixels == ExrPixels::kFloat ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
   header.setType(Imf::SCANLINEIMAGE);
   if (!part.name.empty()) {
     header.setName(part.name);
   }
   for (const std::string& channel : part.channels) {
-    header.channels().insert(channel, Imf::Channel(Imf::FLOAT));
+    header.channels().insert(channel, Imf::Channel(TypeOf(part.pixels)));
   }
   for (const auto& [key, value] : part.attributes) {
     header.insert(key, Imf::StringAttribute(value));
@@ -38,20 +53,84 @@ Imf::Header HeaderOf(const ExrPart& part, const ExrPart& first) {
 }
 
 // OpenEXR's slices address pixel (0, 0) of the data window and don't know const.
-Imf::FrameBuffer BufferOf(const ExrPart& part, float* values, int min_x, int min_y) {
+template <class T>
+Imf::FrameBuffer BufferOf(
+    const ExrPart& part, Imf::PixelType type, T* values, int min_x, int min_y) {
   Imf::FrameBuffer buffer;
   const auto width = static_cast<std::ptrdiff_t>(part.width);
   for (std::size_t c = 0; c < part.channels.size(); ++c) {
-    float* base = values + static_cast<std::ptrdiff_t>(c * part.PixelCount()) - min_x -
-                  width * min_y;
+    T* base = values + static_cast<std::ptrdiff_t>(c * part.PixelCount()) - min_x -
+              width * min_y;
     buffer.insert(part.channels[c],
-                  Imf::Slice(Imf::FLOAT,
+                  Imf::Slice(type,
                              static_cast<char*>(static_cast<void*>(base)),
-                             sizeof(float),
-                             sizeof(float) * static_cast<std::size_t>(part.width)));
+                             sizeof(T),
+                             sizeof(T) * static_cast<std::size_t>(part.width)));
   }
   return buffer;
 }
+
+template <class T>
+void WritePixels(Imf::OutputPart& output, const ExrPart& part, std::vector<T> values) {
+  output.setFrameBuffer(BufferOf(part, TypeOf(part.pixels), values.data(), 0, 0));
+  output.writePixels(part.height);
+}
+
+void WritePart(Imf::OutputPart& output, const ExrPart& part) {
+  switch (part.pixels) {
+    case ExrPixels::kFloat:
+      return WritePixels<float>(output, part, part.values);
+    case ExrPixels::kHalf:
+      return WritePixels<Imath::half>(
+          output, part, {part.values.begin(), part.values.end()});
+    case ExrPixels::kCodes: {
+      std::vector<unsigned> codes;
+      codes.reserve(part.values.size());
+      for (const float value : part.values) {
+        Expect(value >= 0 && value <= 0x1p24F && value == std::floor(value),
+               "whole numbers from 0 to 2^24");
+        codes.push_back(static_cast<unsigned>(value));
+      }
+      return WritePixels<unsigned>(output, part, std::move(codes));
+    }
+  }
+}
+
+std::vector<Imf::Header> HeadersOf(const std::vector<ExrPart>& parts) {
+  Expect(!parts.empty(), "at least one part");
+  std::vector<Imf::Header> headers;
+  for (const ExrPart& part : parts) {
+    Expect(part.width > 0 && part.height > 0, "a picture with pixels");
+    Expect(part.values.size() == part.PixelCount() * part.channels.size(),
+           "channels * height * width values");
+    headers.push_back(HeaderOf(part, parts.front()));
+  }
+  return headers;
+}
+
+void WriteParts(Imf::MultiPartOutputFile& file, const std::vector<ExrPart>& parts) {
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    Imf::OutputPart output(file, static_cast<int>(i));
+    WritePart(output, parts[i]);
+  }
+}
+
+// Counts what is written to it, and keeps nothing.
+class CountingStream : public Imf::OStream {
+ public:
+  CountingStream() : Imf::OStream("memory") {}
+  void write(const char[], int n) override {
+    position_ += static_cast<std::uint64_t>(n);
+    size_ = std::max(size_, position_);
+  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = position; }
+  std::uint64_t size() const { return size_; }
+
+ private:
+  std::uint64_t position_ = 0;
+  std::uint64_t size_ = 0;
+};
 
 // Alphabetical, but R, G, B (and X, Y, Z as they are) in the order people think of
 // them.
@@ -94,7 +173,8 @@ ExrPart ReadPart(Imf::MultiPartInputFile& file, int index, std::size_t& bytes_le
   bytes_left -= static_cast<std::size_t>(bytes);
   part.values.resize(part.PixelCount() * part.channels.size());
   Imf::InputPart input(file, index);
-  input.setFrameBuffer(BufferOf(part, part.values.data(), window.min.x, window.min.y));
+  input.setFrameBuffer(
+      BufferOf(part, Imf::FLOAT, part.values.data(), window.min.x, window.min.y));
   input.readPixels(window.min.y, window.max.y);
   return part;
 }
@@ -107,33 +187,30 @@ int ExrPart::FindChannel(const std::string& channel) const {
 }
 
 void WriteExr(const std::filesystem::path& path, const std::vector<ExrPart>& parts) {
-  Expect(!parts.empty(), "at least one part");
-  std::vector<Imf::Header> headers;
-  for (const ExrPart& part : parts) {
-    Expect(part.width > 0 && part.height > 0, "a picture with pixels");
-    Expect(part.values.size() == part.PixelCount() * part.channels.size(),
-           "channels * height * width values");
-    headers.push_back(HeaderOf(part, parts.front()));
-  }
+  const std::vector<Imf::Header> headers = HeadersOf(parts);
   AtomicFile file(path);
   try {
     Imf::MultiPartOutputFile output(file.temporary_path().c_str(),
                                     headers.data(),
                                     static_cast<int>(headers.size()));
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      Imf::OutputPart part(output, static_cast<int>(i));
-      // Written from, never to: the cast is OpenEXR's interface, not a change of the
-      // data.
-      part.setFrameBuffer(
-          BufferOf(parts[i], const_cast<float*>(parts[i].values.data()), 0, 0));
-      part.writePixels(parts[i].height);
-    }
+    WriteParts(output, parts);
   } catch (const Error&) {
     throw;
   } catch (const std::exception& e) {
     throw Error("cannot write " + path.string() + ": " + e.what());
   }
   file.Commit();
+}
+
+std::int64_t ExrFileBytes(const std::vector<ExrPart>& parts) {
+  const std::vector<Imf::Header> headers = HeadersOf(parts);
+  CountingStream stream;
+  {
+    Imf::MultiPartOutputFile output(
+        stream, headers.data(), static_cast<int>(headers.size()));
+    WriteParts(output, parts);
+  }
+  return static_cast<std::int64_t>(stream.size());
 }
 
 std::vector<ExrPart> ReadExr(const std::filesystem::path& path, std::size_t max_bytes) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -10,6 +11,13 @@ namespace nacre {
 /// String attributes of an OpenEXR part; ours are prefixed "nacre.".
 using ExrAttributes = std::map<std::string, std::string>;
 
+/// How the values of a part are kept in the file. In memory they are always floats.
+enum class ExrPixels {
+  kFloat,  ///< FLOAT, ZIP
+  kHalf,   ///< HALF, PIZ: values are rounded to 11 significant bits
+  kCodes,  ///< UINT, PIZ: whole numbers from 0 to 2^24
+};
+
 /// One part of an OpenEXR file held in memory: 32-bit floats, channel after channel
 /// (planar), each row by row from the top.
 struct ExrPart {
@@ -19,6 +27,7 @@ struct ExrPart {
   std::vector<std::string> channels;  ///< "R", "G", "B", "638nm", …
   std::vector<float> values;          ///< channels.size() · height · width
   ExrAttributes attributes;
+  ExrPixels pixels = ExrPixels::kFloat;  ///< used by WriteExr alone
 
   std::size_t PixelCount() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -29,8 +38,11 @@ struct ExrPart {
   int FindChannel(const std::string& channel) const;
 };
 
-/// Writes FLOAT scan lines, ZIP (lossless), atomically, in the given order of parts.
+/// Writes scan lines, losslessly compressed, atomically, in the given order of parts.
 void WriteExr(const std::filesystem::path& path, const std::vector<ExrPart>& parts);
+
+/// The size of the file that WriteExr would write.
+std::int64_t ExrFileBytes(const std::vector<ExrPart>& parts);
 
 /// Reads all parts of a scan-line or tiled file; HALF and UINT are widened to float;
 /// the order of channels is the file's (alphabetical) except that R, G, B come in that

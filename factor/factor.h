@@ -23,16 +23,21 @@ struct FactorOptions {
   double log_weight = 0;
   int sample_rows = 256;
   int fill_rounds = 2;
+  double bits = 0;
+  double tail_weight = 1;
 
   int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
   std::uint64_t seed = 1;  ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
-    visit("method", self.method, Range{}, "log-svd or svd");
+    visit("method", self.method, Range{}, "log-svd, svd or bilinear");
     visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
     visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
-    visit("bytes", self.bytes, Range{0}, "fewer terms, to fit this size; 0: no limit");
+    visit("bytes",
+          self.bytes,
+          Range{0},
+          "fewer terms, for a file of this size at most; 0: no limit");
     visit("error",
           self.error,
           Range{0, 1},
@@ -49,6 +54,15 @@ struct FactorOptions {
           self.fill_rounds,
           Range{0, 20},
           "times that missing values are predicted and fitted again");
+    visit("bits",
+          self.bits,
+          Range{0, 32},
+          "of the values of a factor map, 4 to 16, or 32: floats; 0: as few as add 1 % "
+          "to the errors");
+    visit("tail_weight",
+          self.tail_weight,
+          Range{0, 1},
+          "of bilinear: 0 minimises the error in R_d, 1 that over the root of R_d");
   }
 };
 
@@ -58,12 +72,16 @@ const std::vector<std::string>& FactorMethods();
 /// What was done and how good it is. Errors are over the valid measurements, all
 /// channels together, after rounding to floats and with each slice's total corrected.
 struct FactorSummary {
-  std::int64_t bytes = 0;          ///< Material::StorageBytes
+  std::int64_t bytes = 0;          ///< of the file
   std::int64_t dataset_bytes = 0;  ///< the measurements as 32-bit floats
   int terms = 0;                   ///< as stored, at most the option's
   int clusters = 0;
   std::vector<double> a;  ///< a channel; empty for the linear model
   std::vector<double> b;
+  double bits = 32;      ///< of the map that needs most; 32: floats
+  double added_l2 = 0;   ///< growth of the relative L2 error by rounding to these bits,
+                         ///< as a fraction, on the sampled slices
+  double added_log = 0;  ///< the same of the log error
   double relative_l2 = 0;     ///< √(Σ e² / Σ R²)
   double rmse_over_mean = 0;  ///< RMSE in R_d over the mean R_d
   double log_rms = 0;         ///< rms of ln(model / measured) above 1e-5 of the peak

@@ -1,6 +1,7 @@
 #include "factor/material.h"
 
 #include "core/error.h"
+#include "factor/internal/bilinear.h"
 
 #include <algorithm>
 #include <cmath>
@@ -57,8 +58,17 @@ const char* Name(Transform transform) {
   return transform == Transform::kLog ? "log" : "linear";
 }
 
+const char* Name(Form form) {
+  return form == Form::kBilinear ? "bilinear" : "sum";
+}
+
 float Material::Evaluate(int channel, int i, int j, int u, int v) const {
   const std::int64_t point = std::int64_t{j} * points_x + i;
+  const float scale =
+      row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
+  if (form == Form::kBilinear) {
+    return scale * internal::BilinearCell(*this, channel, {i, j}, {u, v});
+  }
   const std::int64_t cell = std::int64_t{v} * core + u;
   const int k = cluster.empty() ? 0 : cluster[static_cast<std::size_t>(point)];
   double s = 0;
@@ -66,8 +76,7 @@ float Material::Evaluate(int channel, int i, int j, int u, int v) const {
     s += static_cast<double>(FactorMap(channel, term)[point]) *
          static_cast<double>(Kernel(channel, k, term)[cell]);
   }
-  return static_cast<float>(std::max(0.0, Undo(*this, channel, s))) *
-         row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
+  return static_cast<float>(std::max(0.0, Undo(*this, channel, s))) * scale;
 }
 
 void Material::EvaluateWindow(int channel, int i, int j, float* window) const {
@@ -82,6 +91,10 @@ void Material::EvaluateWindow(int channel, int i, int j, float* window) const {
 
 void Material::EvaluateTerms(
     int channel, int i, int j, int term_count, float* window) const {
+  if (form == Form::kBilinear) {
+    internal::BilinearWindow(*this, channel, {i, j}, window);
+    return;
+  }
   const std::int64_t point = std::int64_t{j} * points_x + i;
   const int k = cluster.empty() ? 0 : cluster[static_cast<std::size_t>(point)];
   std::vector<double> sum(static_cast<std::size_t>(WindowSize()), 0.0);
@@ -125,8 +138,28 @@ void Validate(const Material& m, const std::string& origin) {
     positive(m.a[c], "a");
     positive(m.b[c], "b");
   }
-  check.Size(m.f, channels * m.terms * m.PointCount(), "f");
-  check.Size(m.h, channels * m.cluster_count * m.terms * m.WindowSize(), "h");
+  check.Require(
+      m.margin >= 0 && m.margin <= m.core, "margin", fmt::format("{}", m.margin));
+  if (m.form == Form::kBilinear) {
+    check.Require(m.cluster_count == 1, "cluster_count", "a bilinear model has one");
+    check.Require(
+        m.transform == Transform::kLinear, "transform", "a bilinear model has none");
+  }
+  const std::int64_t maps = std::int64_t{m.MapSets()} * m.terms;
+  const std::int64_t kernels = channels * m.cluster_count * m.KernelCount();
+  check.Size(m.f, maps * m.MapSize(), "f");
+  check.Size(m.h, kernels * m.WindowSize(), "h");
+  check.Size(m.steps.f, m.steps.empty() ? 0 : maps, "steps of f");
+  check.Size(m.steps.h, m.steps.empty() ? 0 : channels, "steps of h");
+  if (!m.steps.empty()) {
+    std::for_each(m.steps.f.begin(), m.steps.f.end(), [&](float step) {
+      positive(static_cast<double>(step), "step of f");
+    });
+    std::for_each(m.steps.h.begin(), m.steps.h.end(), [&](float step) {
+      positive(static_cast<double>(step), "step of h");
+    });
+    positive(static_cast<double>(m.steps.row_scale), "step of row_scale");
+  }
   check.Size(m.cluster, m.PointCount(), "cluster");
   check.Size(m.row_scale, channels * m.PointCount(), "row_scale");
   check.Size(m.albedo, channels * m.PointCount(), "albedo");

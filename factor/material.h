@@ -24,8 +24,28 @@ struct TermsError {
   friend bool operator==(const TermsError&, const TermsError&) = default;
 };
 
-/// A factored dataset: R'_d(x_i, d) of channel c is
-///   row_scale_c(x_i) · max(0, T_c(Σ_j f_cj(x_i) h_ckj(d))),  k = cluster(x_i).
+/// How maps f and kernels h make R_d.
+enum class Form {
+  kSum,       ///< Σ_j f_j(x_i) h_j(d), maps and kernels a channel
+  kBilinear,  ///< Σ_jk f_j(x_i) h_jk(d) f_k(x_o), maps shared by all channels
+};
+
+const char* Name(Form form);
+
+/// What values are whole multiples of, so that a file holds small whole numbers. Empty
+/// (and 0): any float.
+struct Steps {
+  std::vector<float> f;  ///< a map, in the order of Material::f
+  std::vector<float> h;  ///< a channel
+  float row_scale = 0;
+  bool empty() const { return f.empty(); }
+  friend bool operator==(const Steps&, const Steps&) = default;
+};
+
+/// A factored dataset. R'_d(x_i, d) of channel c is, for the two forms,
+///   row_scale_c(x_i) · max(0, T_c(Σ_j f_cj(x_i) h_ckj(d))),  k = cluster(x_i),
+///   max(0, Σ_jk f_j(x_i) h_cjk(d) f_k(x_o)),  h_cjk(d) = h_ckj(−d),  x_o = x_i + d.
+/// The second is reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d).
 /// Indices, units and orientation are those of reconstruct::RdHeader.
 struct Material {
   int points_x = 0;
@@ -34,18 +54,25 @@ struct Material {
   double pitch_mm = 0;
   double eta = 1;
   std::vector<std::string> channels;
-  std::string method;  ///< "log-svd", "svd", …
-  Transform transform = Transform::kLinear;
+  std::string method;  ///< "log-svd", "svd", "bilinear"
+  Form form = Form::kSum;
+  Transform transform = Transform::kLinear;  ///< kBilinear: linear
   int terms = 0;
   int cluster_count = 1;
+  int margin = 0;  ///< maps go on for so many points beyond the grid (kBilinear)
 
-  std::vector<double> a;              ///< A a channel (kLog)
-  std::vector<double> b;              ///< B a channel (kLog)
-  std::vector<float> f;               ///< [channel][term][j][i]
-  std::vector<float> h;               ///< [channel][cluster][term][v][u]
+  std::vector<double> a;  ///< A a channel (kLog)
+  std::vector<double> b;  ///< B a channel (kLog)
+  /// [channel][term][j][i]; kBilinear: [term][j][i], with margin on all sides.
+  std::vector<float> f;
+  /// [channel][cluster][term][v][u]; kBilinear: [channel][pair][v][u], pairs being
+  /// (0, 0), (0, 1), …, (1, 1), (1, 2), …
+  std::vector<float> h;
   std::vector<std::uint8_t> cluster;  ///< [j][i], all 0 without clustering
   std::vector<float> row_scale;  ///< [channel][j][i]; makes each slice's total exact
+                                 ///< (kBilinear: 1 everywhere)
   std::vector<float> albedo;  ///< [channel][j][i]: Σ_d R_d · pitch², dimensionless
+  Steps steps;
   std::map<std::string, double>
       error;  ///< of the fit: "relative_l2", "rmse_over_mean", …
   std::vector<TermsError> error_curve;  ///< what fewer terms would have given
@@ -53,13 +80,24 @@ struct Material {
 
   std::int64_t PointCount() const { return std::int64_t{points_x} * points_y; }
   std::int64_t WindowSize() const { return std::int64_t{core} * core; }
-  const float* FactorMap(int channel, int term) const {
-    return &f[static_cast<std::size_t>((std::int64_t{channel} * terms + term) *
-                                       PointCount())];
+  int MapWidth() const { return points_x + 2 * margin; }
+  int MapHeight() const { return points_y + 2 * margin; }
+  std::int64_t MapSize() const { return std::int64_t{MapWidth()} * MapHeight(); }
+  /// Sets of factor maps: one a channel, or one for all.
+  int MapSets() const {
+    return form == Form::kBilinear ? 1 : static_cast<int>(channels.size());
   }
-  const float* Kernel(int channel, int cluster_index, int term) const {
+  /// Kernels of a channel and cluster.
+  int KernelCount() const {
+    return form == Form::kBilinear ? terms * (terms + 1) / 2 : terms;
+  }
+  const float* FactorMap(int channel, int term) const {
+    const int set = MapSets() == 1 ? 0 : channel;
+    return &f[static_cast<std::size_t>((std::int64_t{set} * terms + term) * MapSize())];
+  }
+  const float* Kernel(int channel, int cluster_index, int n) const {
     return &h[static_cast<std::size_t>(
-        ((std::int64_t{channel} * cluster_count + cluster_index) * terms + term) *
+        ((std::int64_t{channel} * cluster_count + cluster_index) * KernelCount() + n) *
         WindowSize())];
   }
 
@@ -67,9 +105,9 @@ struct Material {
   float Evaluate(int channel, int i, int j, int u, int v) const;
   /// The whole window of one point and channel, core × core values, into `window`.
   void EvaluateWindow(int channel, int i, int j, float* window) const;
-  /// The same with the first `term_count` terms only and without row_scale.
+  /// The same without row_scale and, of a kSum, with the first `term_count` terms only.
   void EvaluateTerms(int channel, int i, int j, int term_count, float* window) const;
-  /// Bytes of f, h, cluster map and row_scale as they are held.
+  /// Bytes of f, h, cluster map and row_scale as they are held in memory.
   std::int64_t StorageBytes() const;
 };
 
@@ -81,5 +119,8 @@ void Validate(const Material& material, const std::string& origin);
 /// with everything else in attributes). Atomic; reading checks every size and value.
 void WriteMaterial(const std::filesystem::path& path, const Material& material);
 Material ReadMaterial(const std::filesystem::path& path);
+
+/// The size of the file that WriteMaterial would write.
+std::int64_t FileBytes(const Material& material);
 
 }  // namespace nacre::factor

@@ -2,15 +2,18 @@
 // viewer shows something sensible:
 //   albedo     points_x × points_y                     first: what viewers open
 //   row_scale  points_x × points_y
-//   factors    (terms · points_x) × points_y           maps f_j side by side
-//   kernels    (terms · core) × (clusters · core)      kernels h_j, a cluster a row
+//   factors    (terms · map width) × map height        maps f_j side by side
+//   kernels    (kernels · core) × (clusters · core)    kernels h_j, a cluster a row
 //   cluster    points_x × points_y, channel Y
+// Where the material has steps, values are whole numbers instead, times a step. Maps
+// that all channels share are channel Y.
 // Everything else is in string attributes of the first part, prefixed "nacre.".
 
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "factor/internal/material_codes.h"
 #include "factor/material.h"
 
 #include <cmath>
@@ -20,7 +23,9 @@ namespace nacre::factor {
 namespace {
 
 constexpr const char* kFormat = "material";
-constexpr const char* kVersion = "1";
+constexpr const char* kVersion = "2";
+constexpr const char* kOldVersion = "1";  // sums of floats: no form, margin or steps
+const std::vector<std::string> kShared{"Y"};
 
 // A sheet of pictures of equal size, `columns` side by side and `rows` below each
 // other, in channels. Its values run [channel][row][y][column][x], while the material
@@ -58,6 +63,10 @@ struct Sheet {
   }
 };
 
+const std::vector<std::string>& MapChannels(const Material& m) {
+  return m.form == Form::kBilinear ? kShared : m.channels;
+}
+
 struct Layout {
   Sheet points;  // albedo, row_scale
   Sheet factors;
@@ -67,10 +76,11 @@ struct Layout {
 
 Layout LayoutOf(const Material& m) {
   const std::size_t n = m.channels.size();
-  return {{m.points_x, m.points_y, 1, 1, n},
-          {m.points_x, m.points_y, m.terms, 1, n},
-          {m.core, m.core, m.terms, m.cluster_count, n},
-          {m.points_x, m.points_y, 1, 1, 1}};
+  return {
+      {m.points_x, m.points_y, 1, 1, n},
+      {m.MapWidth(), m.MapHeight(), m.terms, 1, static_cast<std::size_t>(m.MapSets())},
+      {m.core, m.core, m.KernelCount(), m.cluster_count, n},
+      {m.points_x, m.points_y, 1, 1, 1}};
 }
 
 template <class T>
@@ -88,6 +98,12 @@ ExrPart ToPart(const char* name,
     part.values[in_sheet] = static_cast<float>(values[in_material]);
   });
   return part;
+}
+
+bool FitsHalf(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) {
+    return value <= 65504 && internal::RoundToHalf(value) == value;
+  });
 }
 
 std::string Exact(double value) {
@@ -114,6 +130,8 @@ ExrAttributes AttributesOf(const Material& m) {
   return {{"nacre.format", kFormat},
           {"nacre.version", kVersion},
           {"nacre.method", m.method},
+          {"nacre.form", Name(m.form)},
+          {"nacre.margin", std::to_string(m.margin)},
           {"nacre.transform", Name(m.transform)},
           {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},
           {"nacre.core", std::to_string(m.core)},
@@ -203,6 +221,16 @@ class AttributeReader {
   std::string path_;
 };
 
+Form ParseForm(const AttributeReader& attributes) {
+  const std::string& text = attributes.Text("form");
+  for (const Form form : {Form::kSum, Form::kBilinear}) {
+    if (text == Name(form)) {
+      return form;
+    }
+  }
+  throw attributes.At("form", "is '" + text + "', neither 'sum' nor 'bilinear'");
+}
+
 Transform ParseTransform(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("transform");
   for (const Transform transform : {Transform::kLinear, Transform::kLog}) {
@@ -250,6 +278,19 @@ Material ReadAttributes(const AttributeReader& attributes) {
   m.eta = attributes.Number("eta");
   m.method = attributes.Text("method");
   m.transform = ParseTransform(attributes);
+  if (attributes.Text("version") != kOldVersion) {
+    m.form = ParseForm(attributes);
+    const double margin = attributes.Number("margin");
+    if (!(margin >= 0 && margin <= m.core && margin == std::floor(margin))) {
+      throw attributes.At(
+          "margin",
+          "is " + attributes.Text("margin") + ", not a count up to the window's");
+    }
+    m.margin = static_cast<int>(margin);
+    if (m.form == Form::kBilinear && m.terms > 1024) {
+      throw attributes.At("terms", "is " + attributes.Text("terms") + ", out of range");
+    }
+  }
   m.provenance = attributes.Text("provenance");
   const Json channels = attributes.List("channels");
   for (const Json& name : channels) {
@@ -342,24 +383,89 @@ void OrderChannels(ExrPart& part) {
   part = std::move(sorted);
 }
 
+// Numbers as the shortest texts that read back the same.
+Json StepsToJson(const Steps& steps, const internal::MaterialCodes& codes) {
+  const auto list = [](const std::vector<float>& values) {
+    Json texts = Json::array();
+    for (const float value : values) {
+      texts.push_back(fmt::format("{}", value));
+    }
+    return texts;
+  };
+  return {{"f", list(steps.f)},
+          {"f_least", Exact(codes.f_least)},
+          {"h", list(steps.h)},
+          {"h_least", Exact(codes.h_least)},
+          {"row_scale", fmt::format("{}", steps.row_scale)}};
+}
+
+// Values where the file holds whole numbers; `m` comes with these.
+void ReadSteps(const AttributeReader& attributes,
+               const std::string& origin,
+               Material& m) {
+  const Json json = attributes.List("steps");
+  for (const char* key : {"f", "f_least", "h", "h_least", "row_scale"}) {
+    if (!json.contains(key)) {
+      throw attributes.At("steps", fmt::format("has no '{}'", key));
+    }
+  }
+  for (const auto& [key, steps] : {std::pair{"f", &m.steps.f}, {"h", &m.steps.h}}) {
+    for (const Json& step : json[key]) {
+      steps->push_back(static_cast<float>(attributes.Parse("steps", step)));
+    }
+  }
+  m.steps.row_scale = static_cast<float>(attributes.Parse("steps", json["row_scale"]));
+  Validate(m, origin);  // a step for each map and channel, before they are used
+  internal::Decode(attributes.Parse("steps", json["f_least"]),
+                   attributes.Parse("steps", json["h_least"]),
+                   m);
+}
+
+std::vector<ExrPart> ToParts(const Material& m) {
+  const Layout layout = LayoutOf(m);
+  ExrAttributes attributes = AttributesOf(m);
+  internal::MaterialCodes codes;
+  ExrPixels pixels = ExrPixels::kFloat;
+  if (!m.steps.empty()) {
+    codes = internal::Encode(m);
+    attributes["nacre.steps"] = StepsToJson(m.steps, codes).dump();
+    pixels = ExrPixels::kCodes;
+  }
+  const auto values =
+      [&](const std::vector<float>& floats,
+          const std::vector<float>& coded) -> const std::vector<float>& {
+    return m.steps.empty() ? floats : coded;
+  };
+  std::vector<ExrPart> parts{
+      ToPart("albedo", layout.points, m.channels, m.albedo),
+      ToPart(
+          "row_scale", layout.points, m.channels, values(m.row_scale, codes.row_scale)),
+      ToPart("factors", layout.factors, MapChannels(m), values(m.f, codes.f)),
+      ToPart("kernels", layout.kernels, m.channels, values(m.h, codes.h)),
+      ToPart("cluster", layout.cluster, kShared, m.cluster)};
+  for (ExrPart& part : parts) {
+    OrderChannels(part);
+    part.pixels = pixels;
+  }
+  if (!m.steps.empty() && FitsHalf(m.albedo)) {
+    parts[0].pixels = ExrPixels::kHalf;
+  } else {
+    parts[0].pixels = ExrPixels::kFloat;
+  }
+  parts[0].attributes = std::move(attributes);
+  parts[0].attributes["nacre.checksum"] = Checksum(parts[0].attributes, parts);
+  return parts;
+}
+
 }  // namespace
 
 void WriteMaterial(const std::filesystem::path& path, const Material& material) {
   Validate(material, path.string());
-  const Layout layout = LayoutOf(material);
-  const std::vector<std::string>& channels = material.channels;
-  std::vector<ExrPart> parts{
-      ToPart("albedo", layout.points, channels, material.albedo),
-      ToPart("row_scale", layout.points, channels, material.row_scale),
-      ToPart("factors", layout.factors, channels, material.f),
-      ToPart("kernels", layout.kernels, channels, material.h),
-      ToPart("cluster", layout.cluster, {"Y"}, material.cluster)};
-  for (ExrPart& part : parts) {
-    OrderChannels(part);
-  }
-  parts[0].attributes = AttributesOf(material);
-  parts[0].attributes["nacre.checksum"] = Checksum(parts[0].attributes, parts);
-  WriteExr(path, parts);
+  WriteExr(path, ToParts(material));
+}
+
+std::int64_t FileBytes(const Material& material) {
+  return ExrFileBytes(ToParts(material));
 }
 
 Material ReadMaterial(const std::filesystem::path& path) {
@@ -372,18 +478,22 @@ Material ReadMaterial(const std::filesystem::path& path) {
                   "'nacre factor' wrote");
   }
   const AttributeReader attributes(found, path.string());
-  if (attributes.Text("version") != kVersion) {
+  const std::string& version = attributes.Text("version");
+  if (version != kVersion && version != kOldVersion) {
     throw attributes.At("version",
-                        "is " + attributes.Text("version") + "; this build reads " +
-                            kVersion + ": a newer nacre is needed");
+                        "is " + version + "; this build reads " + kOldVersion +
+                            " and " + kVersion + ": a newer nacre is needed");
   }
   Material m = ReadAttributes(attributes);
   const Layout layout = LayoutOf(m);
   m.albedo = FromPart<float>(parts, "albedo", layout.points, m.channels, path);
   m.row_scale = FromPart<float>(parts, "row_scale", layout.points, m.channels, path);
-  m.f = FromPart<float>(parts, "factors", layout.factors, m.channels, path);
+  m.f = FromPart<float>(parts, "factors", layout.factors, MapChannels(m), path);
   m.h = FromPart<float>(parts, "kernels", layout.kernels, m.channels, path);
-  m.cluster = FromPart<std::uint8_t>(parts, "cluster", layout.cluster, {"Y"}, path);
+  m.cluster = FromPart<std::uint8_t>(parts, "cluster", layout.cluster, kShared, path);
+  if (found.contains("nacre.steps")) {
+    ReadSteps(attributes, path.string(), m);
+  }
   Validate(m, path.string());
   if (attributes.Text("checksum") != Checksum(found, parts)) {
     throw BadData(path.string() +

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <functional>
 
 namespace nacre::cli::report {
 namespace {
@@ -21,13 +22,13 @@ std::string ErrorOf(const Material& m, const char* key, bool percent) {
 }
 
 std::string Facts(const Material& m) {
-  const double stored = static_cast<double>(m.StorageBytes());
+  const auto stored = static_cast<double>(factor::FileBytes(m));
   const double measured = 4.0 * static_cast<double>(m.PointCount() * m.WindowSize()) *
                           static_cast<double>(m.channels.size());
   std::vector<Fact> facts{
       {"Method", Escape(m.method)},
-      {"Terms a channel", std::to_string(m.terms)},
-      {"Size", Bytes(stored)},
+      {m.MapSets() == 1 ? "Terms" : "Terms a channel", std::to_string(m.terms)},
+      {"Size of the file", Bytes(stored)},
       {"Compression", fmt::format("{} : 1", Number(measured / stored))},
       {"Error, relative L<sup>2</sup>", ErrorOf(m, "relative_l2", true)},
       {"RMSE over mean", ErrorOf(m, "rmse_over_mean", true)},
@@ -91,22 +92,28 @@ std::string CurveFigures(const Material& m) {
               "the tails are kept.")});
 }
 
-// A row a channel, a column a term; every picture has a colour scale of its own.
+constexpr int kMostColumns = 12;
+
+// A row a channel, a column a map or kernel; every picture has a colour scale of its
+// own.
 template <class PlaneOf>
-std::string Sheet(const Material& m, const char* letter, PlaneOf&& plane_of) {
-  const int columns = std::min(m.terms, 12);
+std::string Sheet(const std::vector<std::string>& rows,
+                  int count,
+                  const std::function<std::string(int)>& label_of,
+                  PlaneOf&& plane_of) {
+  const int columns = std::min(count, kMostColumns);
   std::string grid = fmt::format(
       "<div class=\"grid\" style=\"grid-template-columns:auto "
       "repeat({},minmax(0,1fr))\">\n<span></span>",
       columns);
   for (int term = 0; term < columns; ++term) {
-    grid += fmt::format("<span><i>{}</i><sub>{}</sub></span>", letter, term + 1);
+    grid += "<span>" + label_of(term) + "</span>";
   }
-  for (std::size_t c = 0; c < m.channels.size(); ++c) {
-    grid += "\n<span class=\"side\">" + Escape(m.channels[c]) + "</span>";
+  for (std::size_t c = 0; c < rows.size(); ++c) {
+    grid += "\n<span class=\"side\">" + Escape(rows[c]) + "</span>";
     for (int term = 0; term < columns; ++term) {
       grid += ImageTag(DivergingImage(plane_of(static_cast<int>(c), term)),
-                       fmt::format("{}{} of {}", letter, term + 1, m.channels[c]),
+                       fmt::format("picture {} of {}", term + 1, rows[c]),
                        "pixels");
     }
   }
@@ -114,38 +121,71 @@ std::string Sheet(const Material& m, const char* letter, PlaneOf&& plane_of) {
          ColorScale("− largest magnitude", "+ largest magnitude", true);
 }
 
+// "1", or "1,2" for the kernel that joins two maps.
+std::string KernelName(const Material& m, int n) {
+  if (m.form == factor::Form::kSum) {
+    return std::to_string(n + 1);
+  }
+  int first = 0;
+  while (n >= m.terms - first) {
+    n -= m.terms - first++;
+  }
+  return fmt::format("{},{}", first + 1, first + 1 + n);
+}
+
+std::string FirstOf(int count) {
+  return count > kMostColumns ? fmt::format(" The first {} of {}.", kMostColumns, count)
+                              : "";
+}
+
 std::string SheetFigures(const Material& m) {
   const auto window = static_cast<std::size_t>(m.WindowSize());
-  const auto points = static_cast<std::size_t>(m.PointCount());
-  const std::string kernels = Sheet(m, "h", [&](int c, int term) {
-    return Plane{m.core, m.core, {m.Kernel(c, 0, term), window}};
-  });
-  const std::string maps = Sheet(m, "f", [&](int c, int term) {
-    return Plane{m.points_x, m.points_y, {m.FactorMap(c, term), points}};
-  });
-  std::string note;
-  if (m.terms > 12) {
-    note += fmt::format(" The first 12 of {} terms.", m.terms);
-  }
+  const auto map_size = static_cast<std::size_t>(m.MapSize());
+  const bool is_sum = m.form == factor::Form::kSum;
+  const std::string kernels = Sheet(
+      m.channels,
+      m.KernelCount(),
+      [&](int n) { return "<i>h</i><sub>" + KernelName(m, n) + "</sub>"; },
+      [&](int c, int n) {
+        return Plane{m.core, m.core, {m.Kernel(c, 0, n), window}};
+      });
+  const std::string maps = Sheet(
+      is_sum ? m.channels : std::vector<std::string>{"all"},
+      m.terms,
+      [](int n) { return fmt::format("<i>f</i><sub>{}</sub>", n + 1); },
+      [&](int c, int n) {
+        return Plane{m.MapWidth(), m.MapHeight(), {m.FactorMap(c, n), map_size}};
+      });
   const std::string clusters =
       m.cluster_count > 1
           ? fmt::format(" Of the first of {} clusters.", m.cluster_count)
           : "";
+  const std::string beyond =
+      m.margin > 0 ? fmt::format(" They go on for {} points beyond the grid.", m.margin)
+                   : "";
   return Figure(kernels,
-                fmt::format(
-                    "Kernels h<sub>j</sub>(d), ±{} mm: the shapes that every slice "
-                    "is a sum of.{}{}",
-                    Number((m.core - 1) / 2 * m.pitch_mm),
-                    note,
-                    clusters)) +
-         Figure(
-             maps,
-             "Factor maps f<sub>j</sub>(x<sub>i</sub>): how much of each kernel is at "
-             "each point; mean square 1 over the sample." +
-                 note);
+                fmt::format("Kernels h(d), ±{} mm: {}.{}{}",
+                            Number((m.core - 1) / 2 * m.pitch_mm),
+                            is_sum ? "the shapes that every slice is a sum of"
+                                   : "how light goes from one map to another",
+                            FirstOf(m.KernelCount()),
+                            clusters)) +
+         Figure(maps,
+                fmt::format("Factor maps f<sub>j</sub>: {}; mean square 1 over the "
+                            "sample.{}{}",
+                            is_sum ? "how much of each kernel is at each point"
+                                   : "one set for all channels",
+                            FirstOf(m.terms),
+                            beyond));
 }
 
 std::string TransformTable(const Material& m) {
+  if (m.form == factor::Form::kBilinear) {
+    return "<p>R<sub>d</sub> = Σ<sub>jk</sub> f<sub>j</sub>(x<sub>i</sub>) "
+           "h<sub>jk</sub>(d) f<sub>k</sub>(x<sub>o</sub>), h<sub>jk</sub>(d) = "
+           "h<sub>kj</sub>(−d): the same from x<sub>i</sub> to x<sub>o</sub> and back, "
+           "to the last bit.</p>";
+  }
   if (m.transform != factor::Transform::kLog) {
     return "<p>R<sub>d</sub> = Σ<sub>j</sub> f<sub>j</sub> h<sub>j</sub>, a channel at "
            "a "

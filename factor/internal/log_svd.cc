@@ -6,10 +6,10 @@
 #include "factor/internal/log_svd.h"
 
 #include "core/parallel.h"
+#include "factor/internal/method.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace nacre::factor::internal {
 namespace {
@@ -176,26 +176,20 @@ Material ToMaterial(const SvdModel& model,
   const std::size_t channels = header.channels.size();
   const auto points = static_cast<std::size_t>(header.PointCount());
   const auto window = static_cast<std::size_t>(header.WindowSize());
-  Material m;
-  m.points_x = header.points_x;
-  m.points_y = header.points_y;
-  m.core = header.core;
-  m.pitch_mm = header.pitch_mm;
-  m.eta = header.eta;
-  m.channels = header.channels;
+  Material m = EmptyMaterial(header);
   m.transform = model.transforms[0].is_log ? Transform::kLog : Transform::kLinear;
   m.terms = terms;
   m.cluster_count = model.cluster_count;
   m.cluster = model.cluster;
   m.f.assign(channels * static_cast<std::size_t>(terms) * points, 0.0F);
   m.h.assign(model.bases.size() * static_cast<std::size_t>(terms) * window, 0.0F);
-  m.row_scale.assign(channels * points, 1.0F);
-  m.albedo.assign(channels * points, 0.0F);
   const auto clusters = static_cast<std::size_t>(model.cluster_count);
   for (std::size_t c = 0; c < channels; ++c) {
     const RowTransform& transform = model.transforms[c];
-    m.a.push_back(transform.is_log ? transform.a : 1);
-    m.b.push_back(transform.is_log ? transform.b : 1);
+    if (transform.is_log) {
+      m.a[c] = transform.a;
+      m.b[c] = transform.b;
+    }
     for (std::size_t k = 0; k < clusters; ++k) {
       const RowBasis& basis = model.bases[c * clusters + k];
       const double scale = (transform.is_log ? 1 : transform.a) /
@@ -215,26 +209,11 @@ Material ToMaterial(const SvdModel& model,
   return m;
 }
 
-double TotalScale(std::span<const float> rd,
-                  std::span<const std::uint8_t> valid,
-                  std::span<const float> modelled) {
-  double measured_total = 0;
-  double modelled_total = 0;
-  for (std::size_t cell = 0; cell < rd.size(); ++cell) {
-    if (valid[cell] != 0) {
-      measured_total += static_cast<double>(rd[cell]);
-      modelled_total += static_cast<double>(modelled[cell]);
-    }
-  }
-  return modelled_total > 0 ? std::max(0.0, measured_total / modelled_total) : 1;
-}
-
 void ProjectSlice(const SvdModel& model,
                   const SliceBlock& block,
                   std::int64_t row,
                   std::size_t channel,
-                  Material& material,
-                  std::vector<float>& window) {
+                  Material& material) {
   const auto size = static_cast<std::size_t>(material.WindowSize());
   const auto offset =
       (static_cast<std::size_t>(row) * material.channels.size() + channel) * size;
@@ -253,21 +232,6 @@ void ProjectSlice(const SvdModel& model,
     material.f[static_cast<std::size_t>(
         (std::int64_t{c} * material.terms + j) * material.PointCount() + point)] =
         static_cast<float>(coordinates(j) / basis.sigma(j) * root_rows);
-  }
-
-  window.resize(size);
-  const auto i = static_cast<int>(point % material.points_x);
-  const auto j = static_cast<int>(point / material.points_x);
-  material.EvaluateTerms(c, i, j, material.terms, window.data());
-  const double scale = TotalScale(rd, valid, window);
-  const double all = std::accumulate(window.begin(), window.end(), 0.0);
-  const auto at =
-      static_cast<std::size_t>(std::int64_t{c} * material.PointCount() + point);
-  material.row_scale[at] = static_cast<float>(scale);
-  material.albedo[at] =
-      static_cast<float>(scale * all * material.pitch_mm * material.pitch_mm);
-  for (float& value : window) {
-    value *= material.row_scale[at];
   }
 }
 

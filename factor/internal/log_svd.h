@@ -61,27 +61,18 @@ Eigen::VectorXd RowCoordinates(const RowBasis& basis,
                                std::span<const std::uint8_t> valid,
                                int missing);
 
-/// Kernels and transform attributes as a Material keeps them; its f, row_scale and
-/// albedo are sized and zero. f_j gets a root mean square of 1 over the rows, h_j takes
+/// Kernels and transform attributes as a Material keeps them; its f is sized and zero.
+/// f_j gets a root mean square of 1 over the rows, h_j takes
 /// the singular value; the linear model's scale goes into h too.
 Material ToMaterial(const SvdModel& model,
                     const reconstruct::RdHeader& header,
                     int terms);
 
-/// What a modelled slice is multiplied by for its total over the measured cells to be
-/// the measured one: 1 where the model is zero, 0 where the measured total is negative.
-double TotalScale(std::span<const float> rd,
-                  std::span<const std::uint8_t> valid,
-                  std::span<const float> modelled);
-
-/// Projects one slice of one channel and stores f, row_scale (which makes the total
-/// over the measured cells exact) and albedo. `window` is scratch for core² floats and
-/// returns the model's slice.
+/// Projects one slice of one channel: stores its f.
 void ProjectSlice(const SvdModel& model,
                   const SliceBlock& block,
                   std::int64_t row,
                   std::size_t channel,
-                  Material& material,
-                  std::vector<float>& window);
+                  Material& material);
 
 }  // namespace nacre::factor::internal

@@ -7,6 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <filesystem>
+
 namespace nacre {
 namespace {
 
@@ -58,6 +61,35 @@ TEST(Exr, EveryTruncationIsAnError) {
     WriteFile(folder / "cut.exr", bytes.substr(0, size));
     EXPECT_THROW(ReadExr(folder / "cut.exr"), Error) << size << " bytes";
   }
+}
+
+TEST(Exr, WholeNumbersAndHalvesComeBackAndAreSmaller) {
+  const testing::TempFolder folder;
+  ExrPart part = RandomPart("x", 6);
+  part.width = part.height = 64;
+  part.values.clear();
+  RandomStream random(2, 0);
+  for (std::size_t n = 0; n < 4 * part.PixelCount(); ++n) {
+    part.values.push_back(std::floor(900 +
+                                     800 * std::sin(0.01F * static_cast<float>(n)) +
+                                     20 * random.UniformFloat()));
+  }
+  std::int64_t floats = 0;
+  for (const ExrPixels pixels :
+       {ExrPixels::kFloat, ExrPixels::kHalf, ExrPixels::kCodes}) {
+    part.pixels = pixels;
+    WriteExr(folder / "a.exr", {part});
+    EXPECT_EQ(ReadExr(folder / "a.exr")[0].values, part.values);
+    const std::int64_t bytes = ExrFileBytes({part});
+    EXPECT_EQ(bytes,
+              static_cast<std::int64_t>(std::filesystem::file_size(folder / "a.exr")));
+    floats = pixels == ExrPixels::kFloat ? bytes : floats;
+    if (pixels != ExrPixels::kFloat) {
+      EXPECT_LT(bytes, floats);
+    }
+  }
+  part.values[0] = 0.5F;
+  EXPECT_THROW(WriteExr(folder / "a.exr", {part}), std::exception);
 }
 
 TEST(Exr, RefusesMoreThanTheMemoryAllowed) {

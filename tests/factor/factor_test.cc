@@ -56,7 +56,8 @@ TEST(Factor, IsTheTruncatedSvdOfTheTransformedRows) {
   const RdDataset dataset =
       MakeChessboard({.points_x = 16, .points_y = 12, .core = 9, .noise = 1e-3});
   for (const char* method : {"log-svd", "svd"}) {
-    const auto [m, summary] = Factor(dataset, {.method = method, .terms = 5});
+    const auto [m, summary] =
+        Factor(dataset, {.method = method, .terms = 5, .bits = 32});
     ASSERT_EQ(m.terms, 5);
     for (int c = 0; c < 3; ++c) {
       const auto channel = static_cast<std::size_t>(c);
@@ -99,8 +100,7 @@ TEST(Factor, TenTermsAddAtMostThreePercent) {
         MakeChessboard({.points_x = 40, .points_y = 40, .noise = noise, .seed = 21});
     const auto [m, summary] = Factor(dataset, {});
     EXPECT_LT(summary.relative_l2, 0.03) << noise;
-    EXPECT_EQ(summary.bytes, 4 * 3 * (40 * 40 * 11 + 225 * 10));
-    EXPECT_LT(summary.worst_total, 1e-5);
+    EXPECT_LT(summary.worst_total, 0.1 * summary.relative_l2);
   }
 }
 
@@ -136,7 +136,8 @@ TEST(Factor, SliceTotalsAreExactAndNothingIsNegative) {
   const RdDataset dataset =
       MakeChessboard({.points_x = 20, .points_y = 20, .core = 11, .noise = 3e-3});
   for (const char* method : {"log-svd", "svd"}) {
-    const auto [m, summary] = Factor(dataset, {.method = method, .terms = 3});
+    const auto [m, summary] =
+        Factor(dataset, {.method = method, .terms = 3, .bits = 32});
     std::vector<float> window(121);
     for (int p = 0; p < 400; ++p) {
       for (int c = 0; c < 3; ++c) {
@@ -197,7 +198,7 @@ TEST(Factor, ClustersLowerTheErrorAtEqualTerms) {
 
 TEST(Factor, MoreTermsNeverHurtTheCurveAndItsEndIsTheResult) {
   const RdDataset dataset = MakeChessboard({.points_x = 16, .points_y = 16});
-  const auto [m, summary] = Factor(dataset, {.method = "svd", .terms = 8});
+  const auto [m, summary] = Factor(dataset, {.method = "svd", .terms = 8, .bits = 32});
   ASSERT_EQ(summary.error_curve.size(), 8u);
   for (std::size_t n = 1; n < 8; ++n) {
     EXPECT_LT(summary.error_curve[n].relative_l2,
@@ -215,7 +216,8 @@ TEST(Factor, BytesAndErrorChooseTheTerms) {
   const double budget = 0.5 * static_cast<double>(full.bytes);
   const FactorSummary small = Factor(dataset, {.terms = 12, .bytes = budget}).summary;
   EXPECT_LE(static_cast<double>(small.bytes), budget);
-  EXPECT_GT(static_cast<double>(small.bytes), 0.8 * budget);
+  const FactorSummary more = Factor(dataset, {.terms = small.terms + 1}).summary;
+  EXPECT_GT(static_cast<double>(more.bytes), budget);
   const FactorSummary good = Factor(dataset, {.terms = 12, .error = 0.03}).summary;
   EXPECT_LE(good.relative_l2, 0.03);
   EXPECT_LT(good.terms, 12);

@@ -1,0 +1,191 @@
+#include "factor/internal/measure.h"
+
+#include "core/parallel.h"
+#include "factor/internal/material_codes.h"
+#include "reconstruct/error_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace nacre::factor::internal {
+namespace {
+
+constexpr float kMostSteps = 0x1p24F;
+constexpr float kMostHalf = 65504;
+
+// The errors of one slice.
+struct SliceFit {
+  FitError error;
+  double worst_channel = 0;
+  double worst_total = 0;
+  std::int64_t unfit = 0;
+};
+
+FitError ErrorOf(std::span<const float> rd,
+                 std::span<const std::uint8_t> valid,
+                 std::span<const float> modelled,
+                 double floor) {
+  FitError error;
+  for (std::size_t cell = 0; cell < rd.size(); ++cell) {
+    if (valid[cell] != 0) {
+      error.Add(
+          static_cast<double>(rd[cell]), static_cast<double>(modelled[cell]), floor);
+    }
+  }
+  return error;
+}
+
+float RoundScale(double scale, float step) {
+  const auto value = static_cast<float>(scale);
+  return step > 0 ? std::min(std::nearbyint(value / step), kMostSteps) * step : value;
+}
+
+float RoundAlbedo(double albedo, bool rounded) {
+  const auto value = static_cast<float>(albedo);
+  return rounded && value <= kMostHalf ? RoundToHalf(value) : value;
+}
+
+// Sets row_scale and albedo of one slice and channel; `window` returns its values.
+void ScaleSlice(std::span<const float> rd,
+                std::span<const std::uint8_t> valid,
+                std::int64_t point,
+                std::size_t channel,
+                Material& m,
+                std::span<float> window) {
+  const auto c = static_cast<int>(channel);
+  m.EvaluateTerms(c,
+                  static_cast<int>(point % m.points_x),
+                  static_cast<int>(point / m.points_x),
+                  m.terms,
+                  window.data());
+  const auto at = static_cast<std::size_t>(std::int64_t{c} * m.PointCount() + point);
+  if (m.form == Form::kSum) {
+    m.row_scale[at] = RoundScale(TotalScale(rd, valid, window), m.steps.row_scale);
+  }
+  for (float& value : window) {
+    value *= m.row_scale[at];
+  }
+  const double total = std::accumulate(window.begin(), window.end(), 0.0);
+  m.albedo[at] = RoundAlbedo(total * m.pitch_mm * m.pitch_mm, !m.steps.empty());
+}
+
+void Summarize(const Job& job,
+               const std::vector<SliceFit>& fits,
+               const Material& m,
+               FactorSummary& summary) {
+  FitError sum;
+  summary.unfit_slices = 0;
+  summary.worst_slice = 0;
+  summary.worst_total = 0;
+  for (std::size_t n = 0; n < fits.size(); ++n) {
+    sum += fits[n].error;
+    summary.worst_total = std::max(summary.worst_total, fits[n].worst_total);
+    summary.unfit_slices += fits[n].unfit;
+    if (fits[n].worst_channel > summary.worst_slice) {
+      summary.worst_slice = fits[n].worst_channel;
+      summary.worst_slice_i = static_cast<int>(n) % m.points_x;
+      summary.worst_slice_j = static_cast<int>(n) / m.points_x;
+    }
+  }
+  const auto cells = static_cast<double>(m.PointCount() * m.WindowSize()) *
+                     static_cast<double>(m.channels.size());
+  summary.relative_l2 = sum.RelativeL2();
+  summary.rmse_over_mean = sum.RmseOverMean();
+  summary.log_rms = sum.LogRms();
+  summary.peak = job.Peak();
+  const double rmse = sum.Rmse();
+  summary.psnr_db = rmse > 0 && summary.peak > 0
+                        ? 20 * std::log10(summary.peak / rmse)
+                        : std::numeric_limits<double>::infinity();
+  summary.missing_fraction = 1 - static_cast<double>(sum.used) / cells;
+  summary.dataset_bytes = static_cast<std::int64_t>(cells * sizeof(float));
+  summary.terms = m.terms;
+  summary.clusters = m.cluster_count;
+}
+
+}  // namespace
+
+void Measure(Job& job, Material& m, FactorSummary& summary) {
+  const std::int64_t points = m.PointCount();
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const double floor = reconstruct::kLogFloor * job.Peak();
+  std::vector<SliceFit> fits(static_cast<std::size_t>(points));
+  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+    Report(job.progress, {"factor", first, points, "errors"});
+    const SliceBlock block =
+        job.source.Read(first, std::min(kBlockRows, points - first));
+    ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
+      SliceFit& fit = fits[static_cast<std::size_t>(first + row)];
+      std::vector<float> values(window);
+      for (std::size_t c = 0; c < m.channels.size(); ++c) {
+        const std::size_t offset =
+            (static_cast<std::size_t>(row) * m.channels.size() + c) * window;
+        const std::span rd(block.rd + offset, window);
+        const std::span valid(block.valid + offset, window);
+        ScaleSlice(rd, valid, first + row, c, m, values);
+        const FitError error = ErrorOf(rd, valid, values, floor);
+        fit.error += error;
+        fit.worst_channel = std::max(fit.worst_channel, error.RelativeL2());
+        if (error.signal > 0 && error.model > 0) {
+          fit.worst_total =
+              std::max(fit.worst_total, std::abs(error.model / error.signal - 1));
+        } else if (error.signal != 0 || error.model != 0) {
+          ++fit.unfit;
+        }
+      }
+    });
+  }
+  Report(job.progress, {"factor", points, points, "done"});
+  ++job.passes;
+  Summarize(job, fits, m, summary);
+}
+
+FitError SampleError(const Job& job, const Material& m) {
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const std::size_t channels = m.channels.size();
+  const double floor = reconstruct::kLogFloor * job.Peak();
+  const reconstruct::RdDataset& data = job.sample.dataset;
+  std::vector<FitError> errors(job.sample.rows.size());
+  ParallelFor(std::ssize(errors), job.options.thread_count, [&](std::int64_t row) {
+    const auto r = static_cast<std::size_t>(row);
+    const auto i = static_cast<int>(job.sample.rows[r] % m.points_x);
+    const auto j = static_cast<int>(job.sample.rows[r] / m.points_x);
+    std::vector<float> values(window);
+    for (std::size_t c = 0; c < channels; ++c) {
+      m.EvaluateTerms(static_cast<int>(c), i, j, m.terms, values.data());
+      const std::size_t offset = (r * channels + c) * window;
+      const std::span rd(&data.rd[offset], window);
+      const std::span valid(&data.valid[offset], window);
+      if (m.form == Form::kSum) {
+        const auto scale = static_cast<float>(TotalScale(rd, valid, values));
+        for (float& value : values) {
+          value *= scale;
+        }
+      }
+      errors[r] += ErrorOf(rd, valid, values, floor);
+    }
+  });
+  FitError sum;
+  for (const FitError& error : errors) {
+    sum += error;
+  }
+  return sum;
+}
+
+double TotalScale(std::span<const float> rd,
+                  std::span<const std::uint8_t> valid,
+                  std::span<const float> modelled) {
+  double measured_total = 0;
+  double modelled_total = 0;
+  for (std::size_t cell = 0; cell < rd.size(); ++cell) {
+    if (valid[cell] != 0) {
+      measured_total += static_cast<double>(rd[cell]);
+      modelled_total += static_cast<double>(modelled[cell]);
+    }
+  }
+  return modelled_total > 0 ? std::max(0.0, measured_total / modelled_total) : 1;
+}
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,60 @@
+#pragma once
+
+#include "factor/factor.h"
+#include "factor/internal/mean_slice.h"
+#include "factor/internal/slice_source.h"
+#include "reconstruct/clustering.h"
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+namespace nacre::factor::internal {
+
+/// Slices on which parameters are tried, as a dataset of one row of points.
+struct Sample {
+  reconstruct::RdDataset dataset;
+  std::vector<std::int64_t> rows;  ///< their numbers in the whole dataset
+};
+
+/// One of every count / `wanted` slices, at a random place in its stretch, so that the
+/// sample covers the whole grid.
+Sample TakeSample(SliceSource& source, int wanted, std::uint64_t seed);
+
+using Clusterer = std::function<reconstruct::Clustering(
+    const reconstruct::ClusterOptions&, const ProgressFunction&)>;
+
+/// What a method works on and with.
+struct Job {
+  SliceSource& source;
+  const FactorOptions& options;
+  const ProgressFunction& progress;
+  const Clusterer& clusterer;
+  Sample sample;
+  std::vector<ChannelScan> scans;
+  int passes = 0;  ///< times that all slices were read
+
+  /// The largest measurement of any channel, mm⁻².
+  double Peak() const;
+};
+
+/// A way to make maps and kernels of a dataset.
+class Method {
+ public:
+  virtual ~Method() = default;
+  /// No more terms than these make a difference; at most the option's.
+  virtual int MostTerms() const = 0;
+  /// A material of that many terms, without row_scale and albedo.
+  virtual Material Make(int terms) = 0;
+  /// Adds what only this method knows.
+  virtual void Describe(FactorSummary& summary) const = 0;
+};
+
+/// The job must outlive the method.
+std::unique_ptr<Method> MakeSvdMethod(Job& job);
+std::unique_ptr<Method> MakeBilinearMethod(Job& job);
+
+/// Header fields, and row_scale and albedo of the right size.
+Material EmptyMaterial(const reconstruct::RdHeader& header);
+
+}  // namespace nacre::factor::internal

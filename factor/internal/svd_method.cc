@@ -1,0 +1,134 @@
+// The thesis' model and its linear special case.
+
+#include "core/parallel.h"
+#include "factor/internal/log_svd.h"
+#include "factor/internal/method.h"
+#include "factor/internal/projection.h"
+#include "factor/internal/transform_search.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace nacre::factor::internal {
+namespace {
+
+RowMatrix FilledRows(const reconstruct::RdDataset& sample,
+                     std::size_t channel,
+                     const ChannelScan& scan) {
+  const auto window = static_cast<std::size_t>(sample.header.WindowSize());
+  RowMatrix rows(sample.header.PointCount(), sample.header.WindowSize());
+  for (Eigen::Index row = 0; row < rows.rows(); ++row) {
+    const std::size_t offset =
+        (static_cast<std::size_t>(row) * sample.header.channels.size() + channel) *
+        window;
+    FillRow({&sample.rd[offset], window},
+            {&sample.valid[offset], window},
+            scan,
+            {&rows(row, 0), window});
+  }
+  return rows;
+}
+
+class SvdMethod final : public Method {
+ public:
+  explicit SvdMethod(Job& job) : job_(job) {
+    model_.scans = job.scans;
+    model_.cluster.assign(static_cast<std::size_t>(job.source.header().PointCount()),
+                          0);
+    if (job.options.clusters > 1) {
+      reconstruct::Clustering clustering =
+          job.clusterer({.clusters = job.options.clusters,
+                         .seed = job.options.seed,
+                         .thread_count = job.options.thread_count},
+                        job.progress);
+      model_.cluster = std::move(clustering.labels);
+      model_.cluster_count = clustering.cluster_count;
+      ++job.passes;
+    }
+    ChooseTransforms();
+    FitSvd(job.source,
+           {.terms = job.options.terms,
+            .cluster_count = model_.cluster_count,
+            .fill_rounds = job.options.fill_rounds,
+            .thread_count = job.options.thread_count},
+           model_,
+           job.progress);
+    job.passes += model_.passes;
+    curve_ = ErrorCurve(job, model_, MostTerms());
+  }
+
+  int MostTerms() const override {
+    Eigen::Index rank = 1;
+    for (const RowBasis& basis : model_.bases) {
+      rank = std::max(rank, basis.rank());
+    }
+    return std::min(job_.options.terms, static_cast<int>(rank));
+  }
+
+  Material Make(int terms) override { return Project(job_, model_, terms); }
+
+  void Describe(FactorSummary& summary) const override {
+    summary.error_curve = curve_;
+    summary.search_steps = search_steps_;
+    for (std::size_t c = 0; c < model_.transforms.size(); ++c) {
+      const RowTransform& t = model_.transforms[c];
+      if (!t.is_log) {
+        continue;
+      }
+      summary.a.push_back(t.a);
+      summary.b.push_back(t.b);
+      if (t.a * t.b > 3 * model_.scans[c].peak && model_.scans[c].peak > 0) {
+        summary.notes.push_back(
+            fmt::format("channel {}: A·B is {:.3g} peaks: the error in R_d is least "
+                        "where the logarithm is nearly linear; --log-weight trades it "
+                        "for the tails",
+                        c,
+                        t.a * t.b / model_.scans[c].peak));
+      }
+    }
+  }
+
+ private:
+  void ChooseTransforms() {
+    const std::size_t channels = model_.scans.size();
+    model_.transforms.assign(channels, {});
+    std::vector<int> steps(channels, 0);
+    ParallelFor(static_cast<std::int64_t>(channels),
+                job_.options.thread_count,
+                [&](std::int64_t n) {
+                  const auto c = static_cast<std::size_t>(n);
+                  const ChannelScan& scan = model_.scans[c];
+                  const bool is_log = job_.options.method == "log-svd";
+                  const double scale = std::max(scan.peak, -scan.least);
+                  // A channel of zeros: any A and B give ln B = 0 everywhere.
+                  model_.transforms[c] = {is_log, scale > 0 ? scale : 1, 1};
+                  if (!is_log || !(scale > 0)) {
+                    return;
+                  }
+                  const auto choice =
+                      ChooseTransform(FilledRows(job_.sample.dataset, c, scan),
+                                      {.terms = job_.options.terms,
+                                       .peak = scale,
+                                       .least = scan.least,
+                                       .log_weight = job_.options.log_weight});
+                  model_.transforms[c] = choice.transform;
+                  steps[c] = choice.evaluations;
+                });
+    for (const int n : steps) {
+      search_steps_ += n;
+    }
+  }
+
+  Job& job_;
+  SvdModel model_;
+  std::vector<TermsError> curve_;
+  int search_steps_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Method> MakeSvdMethod(Job& job) {
+  return std::make_unique<SvdMethod>(job);
+}
+
+}  // namespace nacre::factor::internal
