@@ -1,5 +1,6 @@
 #include "acquire/rig.h"
 
+#include "acquire/mono_format.h"
 #include "core/atomic_file.h"
 #include "core/hash.h"
 
@@ -59,7 +60,55 @@ GridDescription ReadGrid(const TomlTable& table) {
   return grid;
 }
 
-CameraDescription ReadCamera(const TomlTable& table) {
+SensorRegion ReadRegion(const TomlTable& table) {
+  const std::vector<double> sides = table.Numbers("region", Range{0, 1e5});
+  if (sides.size() != 4 || sides[2] < 1 || sides[3] < 1 ||
+      !std::all_of(
+          sides.begin(), sides.end(), [](double v) { return v == std::floor(v); })) {
+    throw table.At("region", "expected whole numbers, [x, y, width, height]");
+  }
+  return {static_cast<int>(sides[0]),
+          static_cast<int>(sides[1]),
+          static_cast<int>(sides[2]),
+          static_cast<int>(sides[3])};
+}
+
+AravisOptions ReadDevice(const TomlTable& table) {
+  AravisOptions device;
+  device.id = table.Text("id");
+  if (device.id.empty()) {
+    throw table.At("id", "is empty; `nacre doctor` lists the cameras that answer");
+  }
+  device.pixel_format = table.Text("pixel_format", device.pixel_format);
+  const MonoFormat* format = FindMonoFormat(device.pixel_format);
+  if (format == nullptr) {
+    throw table.At(
+        "pixel_format",
+        fmt::format("'{}' isn't one of {}", device.pixel_format, MonoFormatNames()));
+  }
+  if (format->bit_depth <= 8) {
+    throw table.At("pixel_format",
+                   "eight bits are too few for what falls off by decades");
+  }
+  device.trigger = table.Text("trigger", device.trigger);
+  if (table.Has("gain")) {
+    device.gain = table.Number("gain", Range{-100, 1000});
+  }
+  if (table.Has("region")) {
+    device.region = ReadRegion(table);
+  }
+  // 576 bytes pass everywhere; 16 kB is the most that a frame of Ethernet takes.
+  device.packet_size_bytes =
+      table.Integer("packet_size_bytes", device.packet_size_bytes, Range{576, 16384});
+  device.socket_buffer_bytes = table.Integer(
+      "socket_buffer_bytes", device.socket_buffer_bytes, Range{65536, 1 << 30});
+  device.reconnect_s =
+      table.Number("reconnect_s", device.reconnect_s, Range{0, 86'400});
+  table.RejectUnknownKeys();
+  return device;
+}
+
+CameraDescription ReadCamera(const TomlTable& table, bool is_hardware) {
   CameraDescription camera;
   camera.exposures_us = Exposures(table, "exposures_us");
   if (!std::is_sorted(camera.exposures_us.rbegin(), camera.exposures_us.rend())) {
@@ -71,6 +120,9 @@ CameraDescription ReadCamera(const TomlTable& table) {
   if (camera.flat_exposures_us.size() < 2) {
     throw table.At("flat_exposures_us",
                    "photon transfer is a line through at least two exposures");
+  }
+  if (is_hardware) {
+    camera.device = ReadDevice(table.Table("device"));
   }
   table.RejectUnknownKeys();
   return camera;
@@ -143,20 +195,30 @@ RigDescription ParseRig(const std::string& text, const std::filesystem::path& pa
   rig.text = text;
   rig.hash = HashHex(text.data(), text.size());
   rig.kind = root.Text("kind");
-  if (rig.kind != "simulated") {
+  const bool is_hardware = rig.kind == "hardware";
+#ifdef NACRE_HAS_ARAVIS
+  const bool is_known = is_hardware || rig.kind == "simulated";
+  const char* known = "simulated, hardware";
+#else
+  const bool is_known = rig.kind == "simulated";
+  const char* known = "simulated";
+#endif
+  if (!is_known) {
     throw DeviceError(
         root.At("kind",
-                fmt::format("this build has no driver for '{}'; it knows: simulated",
-                            rig.kind))
+                fmt::format(
+                    "this build has no driver for '{}'; it knows: {}", rig.kind, known))
             .what());
   }
   rig.sample = ReadSample(root.Table("sample"));
   rig.grid = ReadGrid(root.Table("grid"));
-  rig.camera = ReadCamera(root.Table("camera"));
+  rig.camera = ReadCamera(root.Table("camera"), is_hardware);
   rig.targets = ReadTargets(root.Table("targets"));
   rig.scanner = ReadScanner(root.Table("scanner"));
   rig.schedule = ReadSchedule(root.FindTable("schedule"), rig.grid.core);
-  root.Has("simulated");  // belongs to rigs/, which checks it
+  if (!is_hardware) {
+    root.Has("simulated");  // belongs to rigs/, which checks it
+  }
   root.RejectUnknownKeys();
   return rig;
 }

@@ -1,10 +1,12 @@
 #pragma once
 
+#include "acquire/aravis_options.h"
 #include "acquire/scan_map.h"
 #include "core/toml.h"
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,6 +42,7 @@ struct CameraDescription {
   int dark_frames = 0;                    ///< at every exposure that is used anywhere
   double target_exposure_us = 0;          ///< checkerboard pictures
   std::vector<double> flat_exposures_us;  ///< photon transfer; a pair of pictures each
+  std::optional<AravisOptions> device;    ///< [camera.device], of kind "hardware"
 };
 
 /// [targets]
@@ -71,7 +74,7 @@ struct RigDescription {
   std::filesystem::path path;  ///< of rig.toml
   std::string text;            ///< its content, verbatim
   std::string hash;            ///< of `text`
-  std::string kind;            ///< "simulated"
+  std::string kind;            ///< "simulated" or "hardware"
   SampleDescription sample;
   GridDescription grid;
   CameraDescription camera;

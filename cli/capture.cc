@@ -14,6 +14,20 @@ namespace {
 // Between two exposures of a camera under software trigger, roughly.
 constexpr double kReadoutSeconds = 0.015;
 
+// There is no driver yet for an illuminator that isn't simulated.
+void RequireSimulated(const std::filesystem::path& rig_toml) {
+  const std::string kind = acquire::ReadRig(rig_toml).kind;
+  if (kind != "simulated") {
+    throw DeviceError(
+        fmt::format("{}: this build has a driver for the camera of a rig of kind '{}' "
+                    "but none for its illuminator, so it can't capture; `nacre doctor "
+                    "--camera {}` takes a picture with the camera alone",
+                    rig_toml.string(),
+                    kind,
+                    rig_toml.string()));
+  }
+}
+
 acquire::SessionWriter OpenSession(const CaptureRequest& request,
                                    rigs::SimulatedRig& rig,
                                    std::optional<std::uint64_t> seed,
@@ -145,6 +159,7 @@ std::function<int()> MakeCaptureVerb(CLI::App& app, const Common& common) {
     if (seed->count() > 0) {
       given.seed = common.seed;
     }
+    RequireSimulated(given.rig);
     if (arguments->plan) {
       return Plan(given, common);
     }

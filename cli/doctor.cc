@@ -1,5 +1,8 @@
 // nacre doctor: what this machine and this build can do, and what to do about the rest.
 
+#ifdef NACRE_HAS_ARAVIS
+#include "cli/camera_check.h"
+#endif
 #include "cli/command_line.h"
 #include "cli/machine_check.h"
 #include "cli/resources.h"
@@ -9,7 +12,9 @@
 #include "core/version.h"
 
 #include <filesystem>
+#include <memory>
 #include <sstream>
+#include <string>
 
 namespace nacre::cli {
 namespace {
@@ -68,16 +73,32 @@ Finding CheckResources() {
 
 std::vector<Finding> CheckDrivers() {
   // Drivers for devices come as modules of their own; this build's are these.
+  std::vector<Finding> findings;
 #ifdef NACRE_HAS_RIGS
-  return {{"drivers", "camera", "simulated", State::kGood, ""},
-          {"drivers", "illuminator", "simulated", State::kGood, ""}};
+  findings.push_back({"drivers", "simulated rigs", "built in", State::kGood, ""});
 #else
-  return {{"drivers",
-           "camera, illuminator",
-           "none",
-           State::kNote,
-           "build with NACRE_WITH_RIGS for the simulated ones"}};
+  findings.push_back({"drivers",
+                      "simulated rigs",
+                      "left out",
+                      State::kNote,
+                      "build with NACRE_WITH_RIGS"});
 #endif
+#ifdef NACRE_HAS_ARAVIS
+  findings.push_back(
+      {"drivers", "cameras", "GigE Vision, USB3 Vision", State::kGood, ""});
+#else
+  findings.push_back({"drivers",
+                      "cameras",
+                      "left out",
+                      State::kNote,
+                      "build with NACRE_WITH_ARAVIS (needs Aravis)"});
+#endif
+  findings.push_back({"drivers",
+                      "illuminators",
+                      "none",
+                      State::kNote,
+                      "only a simulated rig can be captured with"});
+  return findings;
 }
 
 std::string Text(const std::vector<Finding>& findings) {
@@ -100,13 +121,22 @@ std::string Text(const std::vector<Finding>& findings) {
   return text;
 }
 
-int Run(const Common& common) {
+int Run(const std::string& camera, const Common& common) {
   std::vector<Finding> findings = CheckBuild();
   const auto add = [&](const std::vector<Finding>& more) {
     findings.insert(findings.end(), more.begin(), more.end());
   };
   add({CheckResources()});
   add(CheckDrivers());
+#ifdef NACRE_HAS_ARAVIS
+  add(camera.empty() ? CheckCameras() : TryCamera(camera));
+#else
+  if (!camera.empty()) {
+    throw UsageError(
+        "--camera: this build has no driver for cameras; build with "
+        "NACRE_WITH_ARAVIS");
+  }
+#endif
   add(CheckMachine("/", std::filesystem::current_path()));
   std::stable_sort(
       findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
@@ -133,7 +163,12 @@ int Run(const Common& common) {
 
 std::function<int()> MakeDoctorVerb(CLI::App& app, const Common& common) {
   app.footer("ok: fine; --: works, or isn't needed by all; !!: won't work as it is");
-  return [&common] { return Run(common); };
+  auto camera = std::make_shared<std::string>();
+  app.add_option("--camera",
+                 *camera,
+                 "take a picture with this camera, an id, an address or a rig.toml of "
+                 "kind \"hardware\"");
+  return [camera, &common] { return Run(*camera, common); };
 }
 
 }  // namespace nacre::cli

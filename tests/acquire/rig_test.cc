@@ -84,6 +84,60 @@ TEST(Rig, UnknownKindIsADeviceError) {
   }
 }
 
+#ifdef NACRE_HAS_ARAVIS
+// A rig of kind "hardware" with these lines in [camera.device].
+acquire::RigDescription HardwareRig(const std::string& device) {
+  return TestRig({{"\"simulated\"", "\"hardware\""},
+                  {"[targets]", "[camera.device]\n" + device + "\n[targets]"}});
+}
+
+TEST(Rig, ReadsACamerasSettings) {
+  const auto device = HardwareRig(R"(id = "192.168.1.20"
+pixel_format = "Mono12p"
+trigger = "Line1"
+gain = 2.5
+region = [16, 8, 640, 480]
+packet_size_bytes = 9000
+socket_buffer_bytes = 8000000
+reconnect_s = 5)")
+                          .camera.device;
+  ASSERT_TRUE(device);
+  EXPECT_EQ(device->id, "192.168.1.20");
+  EXPECT_EQ(device->pixel_format, "Mono12p");
+  EXPECT_EQ(device->trigger, "Line1");
+  EXPECT_EQ(device->gain, 2.5);
+  EXPECT_EQ(device->region->x, 16);
+  EXPECT_EQ(device->region->height, 480);
+  EXPECT_EQ(device->packet_size_bytes, 9000);
+  EXPECT_EQ(device->socket_buffer_bytes, 8000000);
+  EXPECT_EQ(device->reconnect_s, 5);
+  EXPECT_FALSE(TestRig().camera.device);
+}
+
+TEST(Rig, SaysWhatIsWrongWithACamerasSettings) {
+  const auto message = [](const std::string& lines) {
+    try {
+      HardwareRig(lines);
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::kBadData);
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(message("gain = 1"), HasSubstr("missing camera.device.id"));
+  EXPECT_THAT(message("id = ''"), HasSubstr("`nacre doctor` lists"));
+  EXPECT_THAT(message("id = 'a'\npixel_format = 'RGB8'"),
+              HasSubstr("'RGB8' isn't one of Mono8, Mono10"));
+  EXPECT_THAT(message("id = 'a'\npixel_format = 'Mono8'"), HasSubstr("eight bits"));
+  EXPECT_THAT(message("id = 'a'\nregion = [0, 0, 10]"),
+              HasSubstr("[x, y, width, height]"));
+  EXPECT_THAT(message("id = 'a'\npacket_size_bytes = 100"),
+              HasSubstr("100 is outside"));
+  EXPECT_THAT(message("id = 'a'\nshutter = 1"),
+              HasSubstr("camera.device.shutter: unknown here"));
+}
+#endif
+
 struct BadRig {
   const char* from;
   const char* to;
