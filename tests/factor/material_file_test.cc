@@ -1,6 +1,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/exr.h"
+#include "core/hash.h"
 #include "core/random.h"
 #include "factor/material.h"
 #include "tests/factor/synthetic.h"
@@ -182,6 +183,30 @@ TEST(MaterialFile, BadAttributesAndPartsAreNamed) {
   changed[4].values[0] = 0.5F;
   WriteExr(folder / "bad.exr", changed);
   EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("part 'cluster' holds 0.5"));
+}
+
+// What version 1 wrote: a sum of floats, without form and margin.
+TEST(MaterialFile, FilesOfTheFirstVersionAreRead) {
+  const TempFolder folder;
+  const Material m = MakeMaterial(2);
+  WriteMaterial(folder / "m.nacre.exr", m);
+  std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
+  ExrAttributes& attributes = parts[0].attributes;
+  for (const char* key : {"nacre.form", "nacre.margin", "nacre.checksum"}) {
+    attributes.erase(key);
+  }
+  attributes["nacre.version"] = "1";
+  std::string text;
+  for (const auto& [key, value] : attributes) {
+    text += key.starts_with("nacre.") ? key + '=' + value + '\n' : "";
+  }
+  for (const ExrPart& part : parts) {
+    text += part.name + ':' +
+            HashHex(part.values.data(), part.values.size() * sizeof(float)) + '\n';
+  }
+  attributes["nacre.checksum"] = HashHex(text.data(), text.size());
+  WriteExr(folder / "old.nacre.exr", parts);
+  ExpectEqual(ReadMaterial(folder / "old.nacre.exr"), m);
 }
 
 TEST(MaterialFile, OtherFilesAreNamed) {
