@@ -207,7 +207,8 @@ Quantization Quantize(const Job& job, double bits, Material& material) {
     }
   }
   const std::optional<Quantization> result = attempt(most);
-  if (!result) {
+  // Floats that repeat exactly may pack better than what they are rounded to.
+  if (!result || (bits == 0 && FileBytes(exact) <= FileBytes(material))) {
     material = exact;
     return {};
   }

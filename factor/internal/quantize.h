@@ -18,7 +18,8 @@ struct Quantization {
 /// which are few but carry the faint tails, get a 32nd of a map's step. `bits` 4 to 16
 /// are those of the map with the most; 32 leaves floats; 0 takes the fewest (of 4 to
 /// 16, in halves) that let neither error on the sample grow by more than
-/// kQuantizationGrowth, or floats if even 16 do.
+/// kQuantizationGrowth, or floats if even 16 do
+/// or floats pack better.
 Quantization Quantize(const Job& job, double bits, Material& material);
 
 inline constexpr double kQuantizationGrowth = 0.01;

@@ -54,6 +54,23 @@ TEST(Quantize, FewerBitsAreASmallerFileAndMoreError) {
   EXPECT_GT(before.added_l2, 0.1);
 }
 
+TEST(Quantize, NeverMakesTheFileLarger) {
+  // Every row of points repeats the first: so do the floats of the maps.
+  RdDataset dataset =
+      MakeChessboard({.points_x = 20, .points_y = 24, .core = 11, .channels = 1});
+  const auto row = static_cast<std::size_t>(20 * dataset.header.SliceSize());
+  for (std::size_t n = row; n < dataset.rd.size(); ++n) {
+    dataset.rd[n] = dataset.rd[n % row];
+  }
+  for (const char* method : {"svd", "bilinear"}) {
+    const FactorSummary exact =
+        Factor(dataset, {.method = method, .terms = 8, .bits = 32}).summary;
+    const FactorSummary automatic =
+        Factor(dataset, {.method = method, .terms = 8}).summary;
+    EXPECT_LE(automatic.bytes, exact.bytes) << method;
+  }
+}
+
 TEST(Quantize, OtherBitsAreRefused) {
   for (const double bits : {2.0, 20.0}) {
     try {
