@@ -305,6 +305,30 @@ TEST(FactoredGather, ClustersAgreeWithEveryPatchOnItsOwn) {
   EXPECT_LT(Compare(*a, *b, at).worst(), 0.015);
 }
 
+// The renderer asks for windows and cells and needn't know what they are made of.
+TEST(FactoredGather, ABilinearMaterialIsRenderedLikeTheSumItEquals) {
+  const auto sum = DipoleMaterial(Profiles(), {4, 15, 1.0});
+  factor::Material m = *sum;
+  m.form = factor::Form::kBilinear;
+  m.margin = 2;
+  m.f.assign(static_cast<std::size_t>(m.MapSize()), 1);
+  const auto bilinear = std::make_shared<const factor::Material>(std::move(m));
+  const PlaneShape plane{.side_mm = 20, .spacing_mm = 0.3F};
+  const auto lit = LightPlane(plane, EdgeLight);
+  const auto a = MakeFactored(sum)->Illuminate(lit, 1);
+  for (const double cache_mb : {0.0, 64.0}) {
+    const auto model = MakeFactored(bilinear, {.window_cache_mb = cache_mb});
+    const auto b = model->Illuminate(lit, 1);
+    for (int i = 0; i < 40; ++i) {
+      const SurfacePoint at = plane.At(0.2F * static_cast<float>(i - 20), 0.3F);
+      const Color expected = a->Exitance(at);
+      const Color found = b->Exitance(at);
+      EXPECT_NEAR(found.x, expected.x, 1e-5F * expected.x);
+      EXPECT_NEAR(found.z, expected.z, 1e-5F * expected.z);
+    }
+  }
+}
+
 TEST(FactoredGather, SameBitsForAnyThreads) {
   const auto material = Lopsided({6, 9, 0.5});
   const PlaneShape plane{.side_mm = 6, .spacing_mm = 0.1F, .sample_mm = 3};
