@@ -111,10 +111,12 @@ struct Factorization {
   FactorSummary summary;
 };
 
-/// Factors a dataset, in memory or streamed from its file, which is read three times
-/// (scan, sums, projection), once more to cluster, and `fill_rounds` times more if
-/// values are missing. Streaming holds 512 slices and, a channel and cluster, 8 core⁴
-/// bytes. The same data, options and seed give the same bits whatever the thread count.
+/// Factors a dataset, in memory or streamed from its file. The SVDs read it four times
+/// (scan, sums, projection, errors), once more to cluster, `fill_rounds` times more if
+/// values are missing, and hold 512 slices and, a channel and cluster, 8 core⁴ bytes;
+/// bilinear reads it three times and holds all pairs of points, 5 bytes each. `bytes`
+/// and `error` add one or two readings for each number of terms tried. The same data,
+/// options and seed give the same bits whatever the thread count.
 ///
 /// Throws a usage Error for an unknown method or an option out of range; BadData naming
 /// slice, channel and cell for a value that isn't finite; Interrupted.
