@@ -3,9 +3,9 @@
 #include "calibrate/geometry.h"
 #include "calibrate/laser_map.h"
 #include "calibrate/radiometry.h"
-#include "core/options_json.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/options_json.h"
 #include "core/provenance.h"
 
 #include <fmt/format.h>

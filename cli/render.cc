@@ -3,8 +3,8 @@
 #include "render/render.h"
 
 #include "cli/command_line.h"
-#include "core/options_json.h"
 #include "core/error.h"
+#include "core/options_json.h"
 #include "core/png.h"
 #include "core/provenance.h"
 #include "render/tone.h"

@@ -2,8 +2,8 @@
 
 #include "acquire/frame_file.h"
 #include "acquire/session_writer.h"
-#include "core/json.h"
 #include "core/atomic_file.h"
+#include "core/json.h"
 #include "tests/acquire/fake_rig.h"
 #include "tests/support/temp_folder.h"
 

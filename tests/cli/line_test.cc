@@ -1,7 +1,7 @@
 // From laser spots to a material, on a rig and a phantom that no stage was tuned on.
 
-#include "core/json.h"
 #include "core/atomic_file.h"
+#include "core/json.h"
 #include "tests/cli/command.h"
 #include "tests/support/temp_folder.h"
 

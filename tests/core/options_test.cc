@@ -1,8 +1,7 @@
 #include "core/options.h"
 
-#include "core/options_json.h"
-
 #include "core/error.h"
+#include "core/options_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

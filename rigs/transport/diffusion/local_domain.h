@@ -74,8 +74,8 @@ extern template class LocalDomain<float>;
 extern template class LocalDomain<double>;
 
 /// The share that comes nearest to Monte Carlo on chessboards: 0.25 for η = 1, where
-/// light leaves at all angles, 0.45 for η = 1.5, where it leaves from steep paths and so
-/// from deeper. Found by measurement (README.md).
+/// light leaves at all angles, 0.45 for η = 1.5, where it leaves from steep paths and
+/// so from deeper. Found by measurement (README.md).
 double ExitFromDepth(double eta);
 
 /// Mesh of a layout with its margins; `*margin_columns` on each side.

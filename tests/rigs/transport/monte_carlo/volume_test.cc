@@ -88,14 +88,20 @@ TEST(Volume, RefusesWhatMakesNoSense) {
 
 TEST(Volume, SimulateRefusesBadRequests) {
   const Volume volume = Slab({0.1, 1, 0}, 1, 1.3);
-  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {.width_mm = -1}, {}, {}); }),
+  const auto beam_refusal = [&](const Source& source) {
+    return ErrorMessage([&] { Simulate(volume, source, {}, {}); });
+  };
+  EXPECT_THAT(beam_refusal({.width_mm = -1}),
               ::testing::HasSubstr("a beam of width -1"));
-  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {.angle_rad = 1.6}, {}, {}); }),
+  EXPECT_THAT(beam_refusal({.angle_rad = 1.6}),
               ::testing::HasSubstr("below a right one"));
-  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {}, {.window_core = 3}, {}); }),
+  const auto refusal = [&](const TallyRequest& request, const Options& options) {
+    return ErrorMessage([&] { Simulate(volume, {}, request, options); },
+                        ExitCode::kUsage);
+  };
+  EXPECT_THAT(refusal({.window_core = 3}, {}),
               ::testing::HasSubstr("needs a size greater than 0"));
-  EXPECT_THAT(ErrorMessage([&] { Simulate(volume, {}, {}, {.photon_count = 0}); }),
-              ::testing::HasSubstr("photon_count"));
+  EXPECT_THAT(refusal({}, {.photon_count = 0}), ::testing::HasSubstr("photon_count"));
 }
 
 TEST(Volume, ComesFromAPhantom) {
