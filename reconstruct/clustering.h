@@ -16,19 +16,22 @@ struct ClusterOptions {
   int dimensions = 24;
   double log_offset = 0.003;
 
-  std::uint64_t seed = 1;  ///< of projections and first centres
+  std::uint64_t seed = 1;  ///< of the sample and the first centres
   int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
-    visit("clusters", self.clusters, Range{1, 255}, "groups of slices that look alike");
+    visit("clusters",
+          self.clusters,
+          Range{0, 255},
+          "groups of slices that look alike; 0: as many as the gap statistic finds");
     visit(
         "restarts", self.restarts, Range{1, 1000}, "k-means runs; the best one counts");
     visit("iterations", self.iterations, Range{1, 100000}, "Lloyd steps a run at most");
     visit("dimensions",
           self.dimensions,
           Range{1, 1024},
-          "random projections a slice is reduced to");
+          "principal components a slice is reduced to");
     visit(
         "log_offset",
         self.log_offset,
@@ -44,16 +47,19 @@ struct Clustering {
       labels;          ///< slice j · points_x + i; numbered as they appear
   double inertia = 0;  ///< Σ squared distance to the own centre, in features
   int iterations_used = 0;
+  int dimensions_used = 0;
 };
 
-/// Groups the points x_i by the shape of R'_d(x_i, ·): k-means [Lloyd82] from k-means++
-/// seeds [Arthur07] on random projections [Achlioptas03] of
-/// ln(R'_d / peak + offset), all channels. The same for any number of threads.
+/// Groups the points x_i by the shape of R'_d(x_i, ·): k-means [Lloyd82] from
+/// k-means++ seeds [Arthur07] on principal components of the noise-weighted
+/// ln(R'_d / peak + offset), all channels (reconstruct/README.md). The same for any
+/// number of threads.
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,
                          const ProgressFunction& progress = {});
 
-/// The same, reading slice by slice: memory is points · dimensions.
+/// The same, reading slice by slice: memory is points · dimensions and a sample of 512
+/// slices.
 Clustering ClusterSlices(RdReader& reader,
                          const ClusterOptions& options,
                          const ProgressFunction& progress = {});

@@ -14,21 +14,36 @@ struct PointSet {
   const float* Row(std::int64_t n) const {
     return &values[static_cast<std::size_t>(n * dimensions)];
   }
+  float* Row(std::int64_t n) {
+    return &values[static_cast<std::size_t>(n * dimensions)];
+  }
 };
 
 struct KMeansResult {
   std::vector<int> labels;
-  double inertia = 0;
+  double inertia = 0;  ///< Σ squared distance to the own centre
   int iterations = 0;
   int centre_count = 0;
+  std::int64_t distance_count = 0;  ///< point to centre, in all iterations
 };
 
-/// Lloyd's iteration until no label changes, from k-means++ seeds drawn from
-/// (seed, run). Fewer than k centres come out if fewer than k points differ.
-KMeansResult KMeans(const PointSet& points,
-                    int k,
-                    int max_iterations,
-                    std::uint64_t seed,
-                    std::uint64_t run);
+struct KMeansOptions {
+  int clusters = 1;
+  int max_iterations = 100;
+  std::uint64_t seed = 1;
+  std::uint64_t run = 0;
+  /// Leave out the distances that bounds decide [Hamerly10]. The labels are the same.
+  bool use_bounds = true;
+};
+
+/// Lloyd's iteration [Lloyd82] until no label changes, from k-means++ seeds [Arthur07]
+/// drawn from (seed, run). Fewer than k centres come out if fewer than k points differ.
+KMeansResult KMeans(const PointSet& points, const KMeansOptions& options);
+
+/// The result of least inertia of `restarts` runs, run side by side.
+KMeansResult BestKMeans(const PointSet& points,
+                        const KMeansOptions& options,
+                        int restarts,
+                        int thread_count);
 
 }  // namespace nacre::reconstruct::internal

@@ -3,9 +3,14 @@
 #include "reconstruct/clustering.h"
 
 #include "core/error.h"
+#include "core/exr.h"
+#include "reconstruct/cluster_map.h"
+#include "reconstruct/internal/kmeans.h"
 #include "tests/reconstruct/datasets.h"
 
 #include <gtest/gtest.h>
+
+#include <set>
 
 namespace nacre::reconstruct {
 namespace {
@@ -55,6 +60,74 @@ TEST(Clustering, RecoversPlantedClusters) {
   }
 }
 
+TEST(Clustering, FindsHowManyKindsThereAre) {
+  for (const int kinds : {1, 2, 3, 4}) {
+    std::vector<int> planted;
+    EXPECT_EQ(ClusterSlices(Planted(kinds, planted), {.clusters = 0}).cluster_count,
+              kinds);
+  }
+}
+
+// A channel of noise alone, as its sigma says, and a corner that wasn't measured don't
+// blur what the rest tells.
+TEST(Clustering, NoiseAndHolesDoNotCount) {
+  std::vector<int> planted;
+  RdDataset dataset = Planted(2, planted);
+  RandomStream random(8, 0);
+  for (std::int64_t s = 0; s < dataset.header.PointCount(); ++s) {
+    for (std::int64_t k = 0; k < 81; ++k) {
+      const auto at = static_cast<std::size_t>(s * 162 + 81 + k);
+      dataset.rd[at] = std::exp(4 * (random.UniformFloat() - 0.5F));
+      dataset.sigma[at] = 1.6F * dataset.rd[at];
+      if (s % 3 == 0 && k < 20) {
+        dataset.valid[at - 81] = 0;
+        dataset.rd[at - 81] = 1e3F;
+      }
+    }
+  }
+  const Clustering found = ClusterSlices(dataset, {.clusters = 2});
+  for (std::size_t s = 0; s < planted.size(); ++s) {
+    EXPECT_EQ(found.labels[s], planted[s]) << s;
+  }
+}
+
+TEST(KMeans, BoundsLeaveOutDistancesAndChangeNoLabel) {
+  RandomStream random(3, 0);
+  internal::PointSet points{{}, 3000, 7};
+  for (int n = 0; n < 3000 * 7; ++n) {
+    points.values.push_back(random.UniformFloat() + static_cast<float>(n / 7 % 5));
+  }
+  for (const int k : {2, 5, 40}) {
+    const auto all = internal::KMeans(points, {.clusters = k, .use_bounds = false});
+    const auto few = internal::KMeans(points, {.clusters = k, .use_bounds = true});
+    EXPECT_EQ(all.labels, few.labels);
+    EXPECT_EQ(all.inertia, few.inertia);
+    EXPECT_EQ(all.iterations, few.iterations);
+    EXPECT_LT(few.distance_count, all.distance_count);
+  }
+}
+
+TEST(ClusterMap, HoldsTheLabelsAndAPicture) {
+  const testing::TempFolder folder;
+  std::vector<int> planted;
+  const RdDataset dataset = Planted(3, planted);
+  const Clustering found = ClusterSlices(dataset, {.clusters = 3});
+  WriteClusterMap(folder / "map.exr", dataset.header, found, "{}");
+  const ExrPart part = ReadExr(folder / "map.exr").at(0);
+  ASSERT_EQ(part.values.size(), planted.size());
+  EXPECT_EQ(part.attributes.at("nacre.kind"), "clusters");
+  const PngImage picture = PictureOfClusters(dataset.header, found, 2);
+  EXPECT_EQ(picture.width, 24);
+  std::set<std::array<int, 3>> colours;
+  for (std::size_t s = 0; s < planted.size(); ++s) {
+    EXPECT_EQ(part.values[s], static_cast<float>(found.labels[s]));
+    const std::size_t pixel = 3 * (s / 12 * 2 * 24 + s % 12 * 2);
+    colours.insert(
+        {picture.values[pixel], picture.values[pixel + 1], picture.values[pixel + 2]});
+  }
+  EXPECT_EQ(colours.size(), 3U);
+}
+
 TEST(Clustering, IsTheSameForAnyNumberOfThreads) {
   std::vector<int> planted;
   const RdDataset dataset = Planted(3, planted);
@@ -93,7 +166,7 @@ TEST(Clustering, FewerDifferentSlicesGiveFewerClusters) {
 
 TEST(Clustering, OptionsOutOfRangeAreRefused) {
   std::vector<int> planted;
-  EXPECT_THROW(ClusterSlices(Planted(2, planted), {.clusters = 0}), Error);
+  EXPECT_THROW(ClusterSlices(Planted(2, planted), {.clusters = -1}), Error);
   EXPECT_THROW(ClusterSlices(Planted(2, planted), {.clusters = 256}), Error);
 }
 

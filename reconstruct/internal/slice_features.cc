@@ -1,0 +1,190 @@
+#include "reconstruct/internal/slice_features.h"
+
+#include "core/error.h"
+#include "core/random.h"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cmath>
+
+namespace nacre::reconstruct::internal {
+namespace {
+
+constexpr std::uint64_t kSampleStream = 0x73616D70;
+constexpr int kLanes = 16;  // dimensions a vector
+constexpr int kSlicesAtOnce = 4;
+
+// sums[slice][lane] = Σ_k shapes[slice][k] · components[k][lane], for sixteen columns.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumns(
+    const float* __restrict shapes,
+    const float* __restrict components,
+    std::size_t size,
+    std::size_t stride,
+    float* __restrict sums) {
+  float sum[kSlicesAtOnce][kLanes] = {};
+  for (std::size_t k = 0; k < size; ++k) {
+    const float* row = components + k * stride;
+    for (std::size_t s = 0; s < kSlicesAtOnce; ++s) {
+      const float value = shapes[s * size + k];
+      for (std::size_t lane = 0; lane < kLanes; ++lane) {
+        sum[s][lane] += value * row[lane];
+      }
+    }
+  }
+  std::copy(&sum[0][0], &sum[0][0] + kSlicesAtOnce * kLanes, sums);
+}
+
+std::size_t Stride(int dimensions) {
+  return static_cast<std::size_t>((dimensions + kLanes - 1) / kLanes * kLanes);
+}
+
+float Peak(std::span<const float> rd, std::span<const std::uint8_t> valid) {
+  float peak = 0;
+  for (std::size_t k = 0; k < rd.size(); ++k) {
+    peak = valid[k] != 0 ? std::max(peak, rd[k]) : peak;
+  }
+  return peak;
+}
+
+}  // namespace
+
+SliceFeatures::SliceFeatures(const RdHeader& header,
+                             std::span<const RdSlice> sample,
+                             double log_offset,
+                             int dimensions)
+    : window_(static_cast<std::size_t>(header.WindowSize())),
+      offset_(static_cast<float>(log_offset)),
+      mean_(static_cast<std::size_t>(header.SliceSize()), 0.0F),
+      weight_(mean_.size(), 1.0F) {
+  Expect(!sample.empty(), "slices to learn from");
+  const std::size_t size = mean_.size();
+  std::vector<double> sum(size, 0.0);
+  std::vector<double> square(size, 0.0);
+  std::vector<double> noise(size, 0.0);
+  std::vector<double> count(size, 0.0);
+  std::vector<float> shape(size);
+  for (const RdSlice& slice : sample) {
+    Shape(slice, shape);
+    for (std::size_t k = 0; k < size; ++k) {
+      const auto value = static_cast<double>(shape[k]);
+      const double one = slice.valid[k] != 0 ? 1.0 : 0.0;
+      sum[k] += one * value;
+      square[k] += one * value * value;
+      count[k] += one;
+    }
+    for (std::size_t begin = 0; begin < size; begin += window_) {
+      const float peak = Peak(std::span(slice.rd).subspan(begin, window_),
+                              std::span(slice.valid).subspan(begin, window_));
+      for (std::size_t k = begin; peak > 0 && k < begin + window_; ++k) {
+        // d ln(R/peak + o) = σ / (R + o · peak)
+        const float deviation =
+            slice.valid[k] != 0
+                ? slice.sigma[k] / (std::max(0.0F, slice.rd[k]) + offset_ * peak)
+                : 0.0F;
+        noise[k] += static_cast<double>(deviation) * static_cast<double>(deviation);
+      }
+    }
+  }
+  for (std::size_t k = 0; k < size; ++k) {
+    const double n = std::max(count[k], 1.0);
+    const double mean = sum[k] / n;
+    const double variance = square[k] / n - mean * mean;
+    mean_[k] = static_cast<float>(mean);
+    weight_[k] = static_cast<float>(
+        variance > 0 ? std::max(0.0, variance - noise[k] / n) / variance : 0.0);
+  }
+  FindComponents(sample, dimensions);
+}
+
+void SliceFeatures::Shape(const RdSlice& slice, std::span<float> shape) const {
+  for (std::size_t begin = 0; begin < shape.size(); begin += window_) {
+    const float peak = Peak(std::span(slice.rd).subspan(begin, window_),
+                            std::span(slice.valid).subspan(begin, window_));
+    const float factor = peak > 0 ? 1.0F / peak : 0.0F;
+    for (std::size_t k = begin; k < begin + window_; ++k) {
+      shape[k] =
+          slice.valid[k] != 0
+              ? (std::log(std::max(0.0F, slice.rd[k]) * factor + offset_) - mean_[k]) *
+                    weight_[k]
+              : 0.0F;
+    }
+  }
+}
+
+// The sample is smaller than a slice: its components follow from the eigenvectors of
+// the slices' products, V = Xᵀ U / √λ.
+void SliceFeatures::FindComponents(std::span<const RdSlice> sample, int dimensions) {
+  const auto size = static_cast<Eigen::Index>(mean_.size());
+  const auto count = std::ssize(sample);
+  Eigen::MatrixXf shapes(size, count);
+  for (Eigen::Index s = 0; s < count; ++s) {
+    Shape(sample[static_cast<std::size_t>(s)],
+          {shapes.col(s).data(), static_cast<std::size_t>(size)});
+  }
+  Eigen::MatrixXf gram = Eigen::MatrixXf::Zero(count, count);
+  gram.selfadjointView<Eigen::Lower>().rankUpdate(shapes.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram.cast<double>());
+  Expect(eigen.info() == Eigen::Success, "eigenvalues of a symmetric matrix");
+  const double largest = eigen.eigenvalues()[count - 1];
+  constexpr double kNothing = 1e-7;  // what rounding of floats makes of 0
+  dimensions_ = 1;
+  while (dimensions_ < std::min<std::ptrdiff_t>(dimensions, count) &&
+         eigen.eigenvalues()[count - 1 - dimensions_] > kNothing * largest) {
+    ++dimensions_;
+  }
+  const std::size_t stride = Stride(dimensions_);
+  components_.assign(mean_.size() * stride, 0.0F);
+  for (int d = 0; d < dimensions_ && largest > 0; ++d) {
+    const Eigen::VectorXf component =
+        (shapes * eigen.eigenvectors().col(count - 1 - d).cast<float>()) /
+        static_cast<float>(std::sqrt(eigen.eigenvalues()[count - 1 - d]));
+    for (std::size_t k = 0; k < mean_.size(); ++k) {
+      components_[k * stride + static_cast<std::size_t>(d)] =
+          component[static_cast<Eigen::Index>(k)];
+    }
+  }
+}
+
+void SliceFeatures::Project(std::span<const RdSlice* const> slices,
+                            std::span<float> features) const {
+  const std::size_t size = mean_.size();
+  const std::size_t stride = Stride(dimensions_);
+  std::vector<float> shapes(kSlicesAtOnce * size, 0.0F);
+  std::array<float, kSlicesAtOnce * kLanes> sums{};
+  for (std::size_t first = 0; first < slices.size(); first += kSlicesAtOnce) {
+    const std::size_t count =
+        std::min<std::size_t>(kSlicesAtOnce, slices.size() - first);
+    for (std::size_t s = 0; s < count; ++s) {
+      Shape(*slices[first + s], std::span(shapes).subspan(s * size, size));
+    }
+    for (std::size_t column = 0; column < stride; column += kLanes) {
+      MultiplyColumns(shapes.data(), &components_[column], size, stride, sums.data());
+      for (std::size_t s = 0; s < count; ++s) {
+        for (std::size_t lane = 0;
+             lane < kLanes && column + lane < static_cast<std::size_t>(dimensions_);
+             ++lane) {
+          features[(first + s) * static_cast<std::size_t>(dimensions_) + column +
+                   lane] = sums[s * kLanes + lane];
+        }
+      }
+    }
+  }
+}
+
+std::vector<std::int64_t> SampleSlices(std::int64_t count,
+                                       std::int64_t most,
+                                       std::uint64_t seed) {
+  RandomStream random(seed, kSampleStream);
+  const std::int64_t taken = std::min(count, most);
+  std::vector<std::int64_t> numbers;
+  for (std::int64_t n = 0; n < taken; ++n) {
+    const std::int64_t begin = n * count / taken;
+    const std::int64_t end = (n + 1) * count / taken;
+    numbers.push_back(begin + static_cast<std::int64_t>(
+                                  random.Uniform() * static_cast<double>(end - begin)));
+  }
+  return numbers;
+}
+
+}  // namespace nacre::reconstruct::internal
