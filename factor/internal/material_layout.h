@@ -1,0 +1,82 @@
+#pragma once
+
+/// *.nacre.exr: five parts, each with the material's own channels, so that every EXR
+/// viewer shows something sensible:
+///   albedo     points_x × points_y                     first: what viewers open
+///   row_scale  points_x × points_y
+///   factors    (terms · map width) × map height        maps f_j side by side
+///   kernels    (kernels · core) × (clusters · core)    kernels h_j, a cluster a row
+///   cluster    points_x × points_y, channel Y
+/// Where the material has steps, values are whole numbers instead, times a step. Maps
+/// that all channels share are channel Y.
+/// Everything else is in string attributes of the first part, prefixed "nacre.".
+
+#include "core/exr.h"
+#include "factor/material.h"
+
+#include <string>
+#include <vector>
+
+namespace nacre::factor::internal {
+
+inline constexpr const char* kFormat = "material";
+inline constexpr const char* kVersion = "2";
+/// Sums of floats: no form, margin or steps.
+inline constexpr const char* kOldVersion = "1";
+
+/// A sheet of pictures of equal size, `columns` side by side and `rows` below each
+/// other, in channels. Its values run [channel][row][y][column][x], while the material
+/// holds them [channel][row][column][y][x] (factor maps: one row of maps; kernels: one
+/// row a cluster).
+struct Sheet {
+  int width = 0;
+  int height = 0;
+  int columns = 1;
+  int rows = 1;
+  std::size_t channels = 1;
+
+  std::size_t Size() const {
+    return channels * static_cast<std::size_t>(rows) *
+           static_cast<std::size_t>(columns) * static_cast<std::size_t>(height) *
+           static_cast<std::size_t>(width);
+  }
+
+  // Calls move(index in the sheet, index in the material).
+  template <class Move>
+  void ForEach(Move&& move) const {
+    const auto w = static_cast<std::size_t>(width);
+    const auto h = static_cast<std::size_t>(height);
+    const auto n = static_cast<std::size_t>(columns);
+    for (std::size_t r = 0; r < channels * static_cast<std::size_t>(rows); ++r) {
+      for (std::size_t y = 0; y < h; ++y) {
+        for (std::size_t column = 0; column < n; ++column) {
+          for (std::size_t x = 0; x < w; ++x) {
+            move(((r * h + y) * n + column) * w + x,
+                 ((r * n + column) * h + y) * w + x);
+          }
+        }
+      }
+    }
+  }
+};
+
+struct Layout {
+  Sheet points;  ///< albedo, row_scale
+  Sheet factors;
+  Sheet kernels;
+  Sheet cluster;
+};
+
+Layout LayoutOf(const Material& m);
+
+/// The channel of what all of a material's channels share.
+const std::vector<std::string>& SharedChannel();
+
+/// The channels of the factor maps.
+const std::vector<std::string>& MapChannels(const Material& m);
+
+/// Of all attributes and values but itself, in the order of the file.
+std::string Checksum(const ExrAttributes& attributes,
+                     const std::vector<ExrPart>& parts);
+
+}  // namespace nacre::factor::internal

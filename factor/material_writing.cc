@@ -1,0 +1,168 @@
+// Writes *.nacre.exr (internal/material_layout.h).
+
+#include "core/error.h"
+#include "core/exr.h"
+#include "core/json.h"
+#include "factor/internal/material_codes.h"
+#include "factor/internal/material_layout.h"
+#include "factor/material.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace nacre::factor {
+namespace {
+
+template <class T>
+ExrPart ToPart(const char* name,
+               const internal::Sheet& sheet,
+               const std::vector<std::string>& channels,
+               const std::vector<T>& values) {
+  ExrPart part{name,
+               sheet.width * sheet.columns,
+               sheet.height * sheet.rows,
+               channels,
+               std::vector<float>(sheet.Size()),
+               {}};
+  sheet.ForEach([&](std::size_t in_sheet, std::size_t in_material) {
+    part.values[in_sheet] = static_cast<float>(values[in_material]);
+  });
+  return part;
+}
+
+bool FitsHalf(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(), [](float value) {
+    return value <= 65504 && internal::RoundToHalf(value) == value;
+  });
+}
+
+std::string Exact(double value) {
+  return fmt::format("{}", value);  // the shortest text that reads back the same
+}
+
+std::string Join(const std::vector<double>& values) {
+  Json list = Json::array();
+  for (const double value : values) {
+    list.push_back(Exact(value));
+  }
+  return list.dump();
+}
+
+ExrAttributes AttributesOf(const Material& m) {
+  Json error = Json::object();
+  for (const auto& [key, value] : m.error) {
+    error[key] = Exact(value);
+  }
+  Json curve = Json::array();
+  for (const TermsError& point : m.error_curve) {
+    curve.push_back({point.terms, Exact(point.relative_l2), Exact(point.log_rms)});
+  }
+  return {{"nacre.format", internal::kFormat},
+          {"nacre.version", internal::kVersion},
+          {"nacre.method", m.method},
+          {"nacre.form", Name(m.form)},
+          {"nacre.margin", std::to_string(m.margin)},
+          {"nacre.transform", Name(m.transform)},
+          {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},
+          {"nacre.core", std::to_string(m.core)},
+          {"nacre.terms", std::to_string(m.terms)},
+          {"nacre.clusters", std::to_string(m.cluster_count)},
+          {"nacre.pitch_mm", Exact(m.pitch_mm)},
+          {"nacre.eta", Exact(m.eta)},
+          {"nacre.units", "mm^-2"},
+          {"nacre.channels", Json(m.channels).dump()},
+          {"nacre.a", Join(m.a)},
+          {"nacre.b", Join(m.b)},
+          {"nacre.error", error.dump()},
+          {"nacre.error_curve", curve.dump()},
+          {"nacre.provenance", m.provenance}};
+}
+
+// OpenEXR sorts channels by name and core/exr.h puts R, G, B first again; the checksum
+// is over the order that a reader will find.
+std::vector<std::string> FileOrder(std::vector<std::string> channels) {
+  const auto rank = [](const std::string& name) {
+    return name == "R" ? 0 : name == "G" ? 1 : name == "B" ? 2 : 3;
+  };
+  std::sort(channels.begin(), channels.end(), [&](const auto& a, const auto& b) {
+    return rank(a) != rank(b) ? rank(a) < rank(b) : a < b;
+  });
+  return channels;
+}
+
+void OrderChannels(ExrPart& part) {
+  const std::vector<std::string> order = FileOrder(part.channels);
+  ExrPart sorted = part;
+  for (std::size_t c = 0; c < order.size(); ++c) {
+    const auto from = static_cast<std::size_t>(part.FindChannel(order[c]));
+    std::copy_n(part.Channel(from), part.PixelCount(), sorted.Channel(c));
+  }
+  sorted.channels = order;
+  part = std::move(sorted);
+}
+
+// Numbers as the shortest texts that read back the same.
+Json StepsToJson(const Steps& steps, const internal::MaterialCodes& codes) {
+  const auto list = [](const std::vector<float>& values) {
+    Json texts = Json::array();
+    for (const float value : values) {
+      texts.push_back(fmt::format("{}", value));
+    }
+    return texts;
+  };
+  return {{"f", list(steps.f)},
+          {"f_least", Exact(codes.f_least)},
+          {"h", list(steps.h)},
+          {"h_least", Exact(codes.h_least)},
+          {"row_scale", fmt::format("{}", steps.row_scale)}};
+}
+
+std::vector<ExrPart> ToParts(const Material& m) {
+  const internal::Layout layout = internal::LayoutOf(m);
+  ExrAttributes attributes = AttributesOf(m);
+  internal::MaterialCodes codes;
+  ExrPixels pixels = ExrPixels::kFloat;
+  if (!m.steps.empty()) {
+    codes = internal::Encode(m);
+    attributes["nacre.steps"] = StepsToJson(m.steps, codes).dump();
+    pixels = ExrPixels::kCodes;
+  }
+  const auto values =
+      [&](const std::vector<float>& floats,
+          const std::vector<float>& coded) -> const std::vector<float>& {
+    return m.steps.empty() ? floats : coded;
+  };
+  std::vector<ExrPart> parts{
+      ToPart("albedo", layout.points, m.channels, m.albedo),
+      ToPart(
+          "row_scale", layout.points, m.channels, values(m.row_scale, codes.row_scale)),
+      ToPart("factors", layout.factors, internal::MapChannels(m), values(m.f, codes.f)),
+      ToPart("kernels", layout.kernels, m.channels, values(m.h, codes.h)),
+      ToPart("cluster", layout.cluster, internal::SharedChannel(), m.cluster)};
+  for (ExrPart& part : parts) {
+    OrderChannels(part);
+    part.pixels = pixels;
+  }
+  if (!m.steps.empty() && FitsHalf(m.albedo)) {
+    parts[0].pixels = ExrPixels::kHalf;
+  } else {
+    parts[0].pixels = ExrPixels::kFloat;
+  }
+  parts[0].attributes = std::move(attributes);
+  parts[0].attributes["nacre.checksum"] =
+      internal::Checksum(parts[0].attributes, parts);
+  return parts;
+}
+
+}  // namespace
+
+void WriteMaterial(const std::filesystem::path& path, const Material& material) {
+  Validate(material, path.string());
+  WriteExr(path, ToParts(material));
+}
+
+std::int64_t FileBytes(const Material& material) {
+  return ExrFileBytes(ToParts(material));
+}
+
+}  // namespace nacre::factor
