@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -46,6 +47,11 @@ class Camera {
   /// camera is gone.
   virtual std::optional<Frame> Capture(std::uint64_t picture_number,
                                        std::chrono::milliseconds timeout) = 0;
+
+  /// The listener is called from inside SetExposureUs and Capture: with true as soon as
+  /// the camera is found to be away, before it is waited for, with false once it is
+  /// back. None to begin with; an empty one ends it.
+  virtual void OnAway(std::function<void(bool away)> /*listener*/) {}
 };
 
 }  // namespace nacre::acquire

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,12 +28,22 @@ class Illuminator {
   virtual ~Illuminator() = default;
   virtual IlluminatorInfo Info() const = 0;
 
-  /// Lights these spots with one channel, at full power a spot, until Blank() or the
-  /// next call. Throws DeviceError outside ± max_angle_rad or if the device is gone.
+  /// Lights these spots with one channel until Blank() or the next call; returns when
+  /// they are lit. The mean power of a spot is the same however many there are; their
+  /// order doesn't matter. Throws DeviceError outside ± max_angle_rad or if the device
+  /// is gone and doesn't come back.
   virtual void Light(std::span<const ScanAngle> spots, int channel) = 0;
 
   /// No light at all. Never throws: this is what error paths call.
   virtual void Blank() noexcept = 0;
+
+  /// Returns when the light is as Light() or Blank() asked for last. Throws DeviceError
+  /// if the device doesn't come back.
+  virtual void AwaitSteady() {}
+
+  /// How often the light wasn't as asked for, so far. A picture during whose exposure
+  /// that grew must be taken again.
+  virtual std::int64_t Interruptions() const { return 0; }
 };
 
 }  // namespace nacre::acquire
