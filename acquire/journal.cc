@@ -19,6 +19,8 @@ std::optional<Target> TargetFromName(const std::string& name) {
                               Target::kCheckerboard,
                               Target::kFlat,
                               Target::kReference,
+                              Target::kGlare,
+                              Target::kAmbient,
                               Target::kSample}) {
     if (name == Name(target)) {
       return target;

@@ -128,6 +128,18 @@ CameraDescription ReadCamera(const TomlTable& table, bool is_hardware) {
   return camera;
 }
 
+void ReadPatch(const TomlTable& table, TargetsDescription& targets) {
+  if (!table.Has("patch_mm")) {
+    return;
+  }
+  const std::vector<double> patch_mm = table.Numbers("patch_mm", Range{-1e4, 1e4});
+  if (patch_mm.size() != 2) {
+    throw table.At("patch_mm", "expected two numbers, [x, y]");
+  }
+  targets.patch_mm = PointMm{patch_mm[0], patch_mm[1]};
+  targets.patch_reflectance = table.Number("patch_reflectance", Range{0.01, 1});
+}
+
 TargetsDescription ReadTargets(const TomlTable& table) {
   TargetsDescription targets;
   targets.checkerboard_columns = table.Integer("checkerboard_columns", Range{3, 200});
@@ -146,6 +158,12 @@ TargetsDescription ReadTargets(const TomlTable& table) {
   // A cubic in two variables has ten coefficients and needs four distinct positions
   // along each axis; the fifth makes the residual mean something.
   targets.laser_lattice = table.Integer("laser_lattice", Range{5, 99});
+  targets.reverse_lattice = table.Boolean("reverse_lattice", false);
+  if (table.Has("glare_exposures_us")) {
+    targets.glare_exposures_us = Exposures(table, "glare_exposures_us");
+  }
+  targets.ambient_frames = table.Integer("ambient_frames", 0, Range{0, 1000});
+  ReadPatch(table, targets);
   table.RejectUnknownKeys();
   return targets;
 }

@@ -24,6 +24,8 @@ struct GridDescription {
   int points_y = 0;
   double pitch_mm = 0;
   int core = 0;  ///< odd; cells a side of the window around each point
+  /// Corners of a polygon: points outside of it aren't captured. Empty: all are.
+  std::vector<PointMm> outline_mm;
 
   std::int64_t PointCount() const { return std::int64_t{points_x} * points_y; }
   /// Column i from the left, row j from the top.
@@ -31,6 +33,8 @@ struct GridDescription {
     return {(i - 0.5 * (points_x - 1)) * pitch_mm,
             (0.5 * (points_y - 1) - j) * pitch_mm};
   }
+  /// Whether that point is to be captured.
+  bool Includes(int i, int j) const;
   /// From the origin to the edge of the outermost window.
   double HalfWidthMm() const { return 0.5 * (points_x - 1 + core) * pitch_mm; }
   double HalfHeightMm() const { return 0.5 * (points_y - 1 + core) * pitch_mm; }
@@ -53,8 +57,15 @@ struct TargetsDescription {
   int checkerboard_poses = 0;        ///< pose 0 lies in the sample plane
   double reference_reflectance = 0;  ///< ρ of the diffuse standard
   double reference_exposure_us = 0;
-  int reference_frames = 0;  ///< pictures of the reference a channel
-  int laser_lattice = 0;     ///< n: the reference is lit by n × n spots at once
+  int reference_frames = 0;      ///< pictures of the reference a channel
+  int laser_lattice = 0;         ///< n: the reference is lit by n × n spots at once
+  bool reverse_lattice = false;  ///< in every second of those pictures, last spot first
+  /// Of the reference lit by one spot, a picture a channel; may be empty.
+  std::vector<double> glare_exposures_us;
+  int ambient_frames = 0;  ///< laser off, on reference and sample each
+  /// A diffuse patch that stays beside the sample, lit in each of its pictures.
+  std::optional<PointMm> patch_mm;
+  double patch_reflectance = 0;
 };
 
 /// [scanner]
@@ -69,6 +80,13 @@ struct ScheduleDescription {
   std::uint64_t order_seed = 0;
 };
 
+/// [adaptive]: what a capture may leave out, see acquire/adaptive.h.
+struct AdaptiveDescription {
+  bool skip_exposures = true;  ///< that add nothing
+  bool skip_empty = true;      ///< grid points around which nothing scatters
+  double noise_sigmas = 5;     ///< of the dark pictures: what is above is light
+};
+
 /// A rig and what is to be captured with it, as written in rig.toml.
 struct RigDescription {
   std::filesystem::path path;  ///< of rig.toml
@@ -81,6 +99,7 @@ struct RigDescription {
   TargetsDescription targets;
   ScannerDescription scanner;
   ScheduleDescription schedule;
+  std::optional<AdaptiveDescription> adaptive;  ///< none: every picture is taken
 
   int ChannelCount() const { return static_cast<int>(scanner.channels.size()); }
 };

@@ -14,6 +14,10 @@ const char* Name(Target target) {
       return "flat";
     case Target::kReference:
       return "reference";
+    case Target::kGlare:
+      return "glare";
+    case Target::kAmbient:
+      return "ambient";
     case Target::kSample:
       return "sample";
   }

@@ -11,6 +11,8 @@ enum class Target {
                   ///< plane
   kFlat,          ///< evenly lit white card, for photon transfer
   kReference,     ///< diffuse reflectance standard, flat in the sample plane
+  kGlare,         ///< the same, lit by one spot only: all else is scattered light
+  kAmbient,       ///< laser off, lens open: pose 0 the reference, pose 1 the sample
   kSample,
 };
 

@@ -17,8 +17,9 @@ struct GridIndex {
 };
 
 /// One picture to be taken. What is lit follows from the target: nothing for kNothing,
-/// kCheckerboard and kFlat (those two bring their own light); the laser lattice for
-/// kReference; the spots of `group` for kSample.
+/// kAmbient, kCheckerboard and kFlat (those two bring their own light); the laser
+/// lattice for kReference; its middle spot for kGlare; the spots of `group` and the
+/// patch, if there is one, for kSample.
 struct ScheduledPicture {
   Target target = Target::kNothing;
   int pose = 0;            ///< of the checkerboard
@@ -31,8 +32,10 @@ struct ScheduledPicture {
 /// All pictures of a session in the order in which they are taken; a picture's index
 /// is its number. A pure function of the rig description:
 ///   dark frames at every exposure; checkerboard poses; flat pairs; the reference
-///   target's laser lattice in each channel; then, from `grid_begin` on, each
-///   group of grid points × channel × exposure (longest first), in that nesting.
+///   target's laser lattice in each channel, its middle spot in each channel and
+///   exposure for glare, and it without the laser; the sample without the laser; then,
+///   from `grid_begin` on, each group of grid points × channel × exposure (longest
+///   first), in that nesting.
 class Schedule {
  public:
   explicit Schedule(const RigDescription& rig);
@@ -48,6 +51,10 @@ class Schedule {
   /// Grid points lit together, at least spot_spacing_cells apart along x or y.
   std::span<const GridIndex> Group(int group) const;
 
+  /// The beams that picture calls for, in the order in which they are visited. `map`
+  /// aims at the sample; nothing else needs it.
+  std::vector<ScanAngle> Beams(std::int64_t number, const ScanMap* map) const;
+
   /// The n × n scan angles for the reference target, row by row from the top (+y).
   const std::vector<ScanAngle>& lattice() const { return lattice_; }
 
@@ -56,8 +63,11 @@ class Schedule {
 
  private:
   void AddTargets(const RigDescription& rig);
+  void AddLaserTargets(const RigDescription& rig);
   void AddGroups(const RigDescription& rig);
 
+  GridDescription grid_;
+  TargetsDescription targets_;
   std::vector<ScheduledPicture> pictures_;
   std::vector<GridIndex> points_;  // group after group
   std::vector<std::size_t> group_begin_{0};

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "acquire/scan_map.h"
+#include "calibrate/corrections.h"
 
 #include <array>
 #include <filesystem>
@@ -35,6 +36,10 @@ struct CameraGeometry {
       1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< by row
   std::array<double, 3> camera_from_sample_translation_mm{};
 
+  /// The same camera over a plane that isn't quite the sample plane: its x and y are
+  /// measured along the sample plane's, from the point above its origin.
+  CameraGeometry OnPlane(const SamplePlane& plane) const;
+
   PixelPoint PixelFromSample(PointMm point) const;
   PointMm SampleFromPixel(PixelPoint pixel) const;
   /// The cosine between the sample's normal and the direction to the camera.
@@ -47,6 +52,8 @@ struct CameraGeometry {
 struct DarkLevel {
   double offset_counts = 0;
   double rate_counts_per_us = 0;
+  double offset_sigma_counts = 0;
+  double rate_sigma_counts_per_us = 0;
   double Counts(double exposure_us) const {
     return offset_counts + rate_counts_per_us * exposure_us;
   }
@@ -62,6 +69,8 @@ struct ChannelResponse {
   double flux_scale_counts_mm2_sr_per_us = 0;
   /// Standard deviation over the lattice's spots, relative.
   double flux_scale_spread = 0;
+  /// Standard uncertainty of the flux scale, relative.
+  double flux_scale_sigma = 0;
 };
 
 /// Everything needed to turn counts into R_d; made from pictures alone.
@@ -76,6 +85,14 @@ struct Calibration {
   double reprojection_rms_px = 0;
   double laser_map_rms_mm = 0;
   double laser_map_max_mm = 0;
+  /// Of spots that had no part in the fit.
+  double laser_map_held_out_rms_mm = 0;
+  double gain_sigma_electrons_per_count = 0;
+  double read_noise_sigma_electrons = 0;
+  double focal_sigma_px = 0;
+  double centre_sigma_px = 0;
+  double height_sigma_mm = 0;  ///< of the sample plane's distance from the camera
+  Corrections corrections;
   std::string session_rig_hash;  ///< of the rig description it was made for
   std::string provenance;        ///< JSON text, see core/provenance.h
 

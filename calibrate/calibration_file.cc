@@ -1,19 +1,25 @@
 #include "calibrate/calibration.h"
+#include "calibrate/internal/corrections_json.h"
+#include "calibrate/internal/json_numbers.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/json.h"
-#include "core/options.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <limits>
 
 namespace nacre::calibrate {
 namespace {
 
 constexpr const char* kFormat = "nacre calibration";
-constexpr int kFormatVersion = 1;
+constexpr int kFormatVersion = 2;  // 1 knew no uncertainties and no corrections
+constexpr int kOldestVersion = 1;
+
+using internal::kFinite;
+using internal::kNotNegative;
+using internal::kPositive;
+using internal::Number;
 
 Json ToJson(const CameraGeometry& camera) {
   return Json{
@@ -36,32 +42,16 @@ Json ToJson(const ChannelResponse& channel) {
   return Json{
       {"name", channel.name},
       {"flux_scale_counts_mm2_sr_per_us", channel.flux_scale_counts_mm2_sr_per_us},
-      {"flux_scale_spread", channel.flux_scale_spread}};
-}
-
-constexpr Range kPositive{std::numeric_limits<double>::min(), 1e300};
-constexpr Range kFinite{-1e300, 1e300};
-
-double Number(const Json& json,
-              const char* key,
-              const std::string& origin,
-              Range range = kFinite) {
-  const auto value = Get<double>(json, key, origin);
-  if (!(value >= range.min && value <= range.max)) {
-    throw BadData(
-        fmt::format("{}: field '{}': {} makes no sense there", origin, key, value));
-  }
-  return value;
+      {"flux_scale_spread", channel.flux_scale_spread},
+      {"flux_scale_sigma", channel.flux_scale_sigma}};
 }
 
 template <std::size_t N>
 std::array<double, N> Numbers(const Json& json,
                               const char* key,
                               const std::string& origin) {
-  const auto values = Get<std::vector<double>>(json, key, origin);
-  const bool finite = std::all_of(
-      values.begin(), values.end(), [](double x) { return std::isfinite(x); });
-  if (values.size() != N || !finite) {
+  const std::vector<double> values = internal::List(json, key, origin);
+  if (values.size() != N) {
     throw BadData(
         fmt::format("{}: field '{}' must hold {} finite numbers", origin, key, N));
   }
@@ -105,7 +95,8 @@ CameraGeometry CameraFromJson(const Json& json, const std::string& origin) {
 }
 
 std::vector<ChannelResponse> ChannelsFromJson(const Json& json,
-                                              const std::string& origin) {
+                                              const std::string& origin,
+                                              int version) {
   std::vector<ChannelResponse> channels;
   for (const Json& channel : json) {
     channels.push_back(
@@ -113,12 +104,32 @@ std::vector<ChannelResponse> ChannelsFromJson(const Json& json,
          .flux_scale_counts_mm2_sr_per_us =
              Number(channel, "flux_scale_counts_mm2_sr_per_us", origin, kPositive),
          .flux_scale_spread =
-             Number(channel, "flux_scale_spread", origin, {0, kFinite.max})});
+             Number(channel, "flux_scale_spread", origin, kNotNegative),
+         .flux_scale_sigma =
+             version < 2 ? 0
+                         : Number(channel, "flux_scale_sigma", origin, kNotNegative)});
   }
   if (channels.empty()) {
     throw BadData(origin + ": field 'channels' is empty");
   }
   return channels;
+}
+
+// What version 1 didn't have.
+void ReadUncertainties(const Json& json,
+                       const std::string& origin,
+                       Calibration& calibration) {
+  const auto read = [&](const char* key, double& value) {
+    value = Number(json, key, origin, kNotNegative);
+  };
+  read("dark_offset_sigma_counts", calibration.dark.offset_sigma_counts);
+  read("dark_rate_sigma_counts_per_us", calibration.dark.rate_sigma_counts_per_us);
+  read("gain_sigma_electrons_per_count", calibration.gain_sigma_electrons_per_count);
+  read("read_noise_sigma_electrons", calibration.read_noise_sigma_electrons);
+  read("focal_sigma_px", calibration.focal_sigma_px);
+  read("centre_sigma_px", calibration.centre_sigma_px);
+  read("height_sigma_mm", calibration.height_sigma_mm);
+  read("laser_map_held_out_rms_mm", calibration.laser_map_held_out_rms_mm);
 }
 
 }  // namespace
@@ -129,22 +140,33 @@ void WriteCalibration(const std::filesystem::path& path,
   for (const ChannelResponse& channel : calibration.channels) {
     channels.push_back(ToJson(channel));
   }
-  WriteJson(path,
-            Json{{"format", kFormat},
-                 {"format_version", kFormatVersion},
-                 {"session_rig_xxh3", calibration.session_rig_hash},
-                 {"camera", ToJson(calibration.camera)},
-                 {"reprojection_rms_px", calibration.reprojection_rms_px},
-                 {"dark_offset_counts", calibration.dark.offset_counts},
-                 {"dark_rate_counts_per_us", calibration.dark.rate_counts_per_us},
-                 {"gain_electrons_per_count", calibration.gain_electrons_per_count},
-                 {"read_noise_electrons", calibration.read_noise_electrons},
-                 {"saturation_counts", calibration.saturation_counts},
-                 {"channels", channels},
-                 {"scan_map", acquire::ToJson(calibration.scan_map)},
-                 {"laser_map_rms_mm", calibration.laser_map_rms_mm},
-                 {"laser_map_max_mm", calibration.laser_map_max_mm},
-                 {"provenance", ParseJson(calibration.provenance, path.string())}});
+  WriteJson(
+      path,
+      Json{{"format", kFormat},
+           {"format_version", kFormatVersion},
+           {"session_rig_xxh3", calibration.session_rig_hash},
+           {"camera", ToJson(calibration.camera)},
+           {"reprojection_rms_px", calibration.reprojection_rms_px},
+           {"dark_offset_counts", calibration.dark.offset_counts},
+           {"dark_offset_sigma_counts", calibration.dark.offset_sigma_counts},
+           {"dark_rate_counts_per_us", calibration.dark.rate_counts_per_us},
+           {"dark_rate_sigma_counts_per_us", calibration.dark.rate_sigma_counts_per_us},
+           {"gain_electrons_per_count", calibration.gain_electrons_per_count},
+           {"read_noise_electrons", calibration.read_noise_electrons},
+           {"gain_sigma_electrons_per_count",
+            calibration.gain_sigma_electrons_per_count},
+           {"read_noise_sigma_electrons", calibration.read_noise_sigma_electrons},
+           {"focal_sigma_px", calibration.focal_sigma_px},
+           {"centre_sigma_px", calibration.centre_sigma_px},
+           {"height_sigma_mm", calibration.height_sigma_mm},
+           {"saturation_counts", calibration.saturation_counts},
+           {"channels", channels},
+           {"scan_map", acquire::ToJson(calibration.scan_map)},
+           {"laser_map_rms_mm", calibration.laser_map_rms_mm},
+           {"laser_map_max_mm", calibration.laser_map_max_mm},
+           {"laser_map_held_out_rms_mm", calibration.laser_map_held_out_rms_mm},
+           {"corrections", internal::ToJson(calibration.corrections)},
+           {"provenance", ParseJson(calibration.provenance, path.string())}});
 }
 
 Calibration ReadCalibration(const std::filesystem::path& path) {
@@ -154,32 +176,41 @@ Calibration ReadCalibration(const std::filesystem::path& path) {
   if (Get<std::string>(json, "format", origin) != kFormat) {
     throw BadData(origin + ": not a calibration");
   }
-  if (const int version = Get<int>(json, "format_version", origin);
-      version != kFormatVersion) {
-    throw BadData(fmt::format(
-        "{}: format version {}; this build reads {}", origin, version, kFormatVersion));
+  const int version = Get<int>(json, "format_version", origin);
+  if (version < kOldestVersion || version > kFormatVersion) {
+    throw BadData(fmt::format("{}: format version {}; this build reads {} to {}",
+                              origin,
+                              version,
+                              kOldestVersion,
+                              kFormatVersion));
   }
   Calibration calibration;
   calibration.session_rig_hash = Get<std::string>(json, "session_rig_xxh3", origin);
   calibration.camera =
       CameraFromJson(Get<Json>(json, "camera", origin), origin + ": camera");
-  const Range not_negative{0, kFinite.max};
   calibration.reprojection_rms_px =
-      Number(json, "reprojection_rms_px", origin, not_negative);
+      Number(json, "reprojection_rms_px", origin, kNotNegative);
   calibration.dark.offset_counts = Number(json, "dark_offset_counts", origin);
   calibration.dark.rate_counts_per_us = Number(json, "dark_rate_counts_per_us", origin);
   calibration.gain_electrons_per_count =
       Number(json, "gain_electrons_per_count", origin, kPositive);
   calibration.read_noise_electrons =
-      Number(json, "read_noise_electrons", origin, not_negative);
+      Number(json, "read_noise_electrons", origin, kNotNegative);
   calibration.saturation_counts = Number(json, "saturation_counts", origin, kPositive);
-  calibration.channels =
-      ChannelsFromJson(Get<Json>(json, "channels", origin), origin + ": channels");
+  calibration.channels = ChannelsFromJson(
+      Get<Json>(json, "channels", origin), origin + ": channels", version);
   calibration.scan_map = acquire::ScanMapFromJson(Get<Json>(json, "scan_map", origin),
                                                   origin + ": scan_map");
-  calibration.laser_map_rms_mm = Number(json, "laser_map_rms_mm", origin, not_negative);
-  calibration.laser_map_max_mm = Number(json, "laser_map_max_mm", origin, not_negative);
+  calibration.laser_map_rms_mm = Number(json, "laser_map_rms_mm", origin, kNotNegative);
+  calibration.laser_map_max_mm = Number(json, "laser_map_max_mm", origin, kNotNegative);
   calibration.provenance = Get<Json>(json, "provenance", origin).dump();
+  if (version >= 2) {
+    ReadUncertainties(json, origin, calibration);
+    calibration.corrections = internal::CorrectionsFromJson(
+        Get<Json>(json, "corrections", origin),
+        origin + ": corrections",
+        std::int64_t{calibration.camera.width_px} * calibration.camera.height_px);
+  }
   return calibration;
 }
 

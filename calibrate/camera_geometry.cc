@@ -47,6 +47,38 @@ PixelPoint CameraGeometry::PixelFromSample(PointMm point) const {
   return {fx_px * image.x + cx_px, fy_px * image.y + cy_px};
 }
 
+CameraGeometry CameraGeometry::OnPlane(const SamplePlane& plane) const {
+  // sample_from_plane: columns are the plane's unit axes. The first lies above the
+  // sample's x axis, the second at right angles to it in the plane.
+  const double a = plane.slope_x;
+  const double b = plane.slope_y;
+  const double along = 1 / std::sqrt(1 + a * a);
+  const double across = 1 / std::sqrt((1 + a * a) * (1 + a * a + b * b));
+  const double up = 1 / std::sqrt(1 + a * a + b * b);
+  const std::array<double, 9> axes{along,
+                                   -a * b * across,
+                                   -a * up,
+                                   0,
+                                   (1 + a * a) * across,
+                                   -b * up,
+                                   a * along,
+                                   b * across,
+                                   up};
+  CameraGeometry camera = *this;
+  const auto& r = camera_from_sample_rotation;
+  for (std::size_t row = 0; row < 3; ++row) {
+    for (std::size_t column = 0; column < 3; ++column) {
+      double sum = 0;
+      for (std::size_t k = 0; k < 3; ++k) {
+        sum += r[3 * row + k] * axes[3 * k + column];
+      }
+      camera.camera_from_sample_rotation[3 * row + column] = sum;
+    }
+    camera.camera_from_sample_translation_mm[row] += r[3 * row + 2] * plane.height_mm;
+  }
+  return camera;
+}
+
 PointMm CameraGeometry::SampleFromPixel(PixelPoint pixel) const {
   const PixelPoint ray =
       Undistort(*this, {(pixel.x - cx_px) / fx_px, (pixel.y - cy_px) / fy_px});

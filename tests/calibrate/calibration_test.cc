@@ -226,7 +226,7 @@ INSTANTIATE_TEST_SUITE_P(
     CalibrationFileErrors,
     ::testing::Values(
         BadValue{"/format", "other", "not a calibration"},
-        BadValue{"/format_version", 99, "format version 99; this build reads 1"},
+        BadValue{"/format_version", 99, "format version 99; this build reads 1 to 2"},
         BadValue{"/gain_electrons_per_count", 0, "'gain_electrons_per_count': 0 makes"},
         BadValue{"/read_noise_electrons", -1, "'read_noise_electrons': -1 makes"},
         BadValue{"/dark_offset_counts", nullptr, "'dark_offset_counts'"},

@@ -157,9 +157,11 @@ class SyntheticRig final {
       case Target::kCheckerboard:
         return BoardRates(camera);
       case Target::kReference:
+      case Target::kGlare:
         return SpotRates(camera);
       case Target::kNothing:
       case Target::kSample:
+      case Target::kAmbient:
         break;
     }
     return std::vector<double>(pixel_count, 0.0);
