@@ -1,6 +1,7 @@
 #pragma once
 
 #include "acquire/illuminator.h"
+#include "rigs/sample_pose.h"
 #include "rigs/world.h"
 
 #include <memory>
@@ -20,11 +21,21 @@ struct LaserModel {
   double rotation_rad = 0;
   PointMm offset_mm;
   double max_angle_rad = 0.3;
-  double spot_sigma_mm = 0.12;   ///< of the Gaussian spot on the sample plane
+  double spot_sigma_mm = 0.12;  ///< of the Gaussian spot; geometric mean of its axes
+  double spot_aspect = 1;       ///< of the longer axis to the shorter
+  double spot_angle_rad = 0;    ///< of the longer axis, from +x
+  /// Each mirror stops so far short of where it was sent, whichever side it comes from.
+  /// Spots are visited in their order over and over, so the last precedes the first.
+  double hysteresis_rad = 0;
   std::vector<double> power_mw;  ///< a channel; flux of one spot
   std::vector<std::string> channels;
+  SamplePose sample;
 
   Spot SpotAt(acquire::ScanAngle angle) const;
+  /// Where the beam passes `height_mm` above the sample plane.
+  PointMm PointAt(acquire::ScanAngle angle, double height_mm) const;
+  /// Of the round spots that a beam is made of.
+  double RoundSigmaMm() const;
 };
 
 class LaserTwin final : public acquire::Illuminator {

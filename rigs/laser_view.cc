@@ -85,13 +85,13 @@ void LaserView::OnSample(std::span<const Spot> spots,
     const std::size_t end = map_.Index(0, std::min(map_.height, (band + 1) * kRows));
     std::fill(&radiance[begin], radiance.data() + end, 0.0F);
     for (const Spot& spot : spots) {
-      tiles.AddSpot(
-          {.centre = spot.centre_mm,
-           .entering_mw = flux_mw * FresnelTransmittance(spot.cos_incidence, eta),
-           .channel = channel,
-           .reach_mm = reach_mm},
-          band,
-          radiance.data());
+      tiles.AddSpot({.centre = spot.centre_mm,
+                     .entering_mw = flux_mw * spot.power *
+                                    FresnelTransmittance(spot.cos_incidence, eta),
+                     .channel = channel,
+                     .reach_mm = reach_mm},
+                    band,
+                    radiance.data());
     }
     for (std::size_t k = begin; k < end; ++k) {
       radiance[k] *= radiance_factor_[k];
@@ -110,6 +110,7 @@ std::vector<float> LaserView::OnSample(std::span<const Spot> spots,
 // Adds the Gaussian spot's density of flux, mm⁻². Equidistant samples integrate a
 // Gaussian to rounding as soon as they resolve it.
 void LaserView::AddReferenceSpot(PointMm centre,
+                                 double power,
                                  int row,
                                  float* density_per_mm2) const {
   constexpr double kFarthestSigma = 6;
@@ -130,7 +131,7 @@ void LaserView::AddReferenceSpot(PointMm centre,
       const double dy = (point.y - centre.y) / spot_sigma_mm_;
       sum += std::exp(-0.5 * (dx * dx + dy * dy));
     }
-    density_per_mm2[column] += static_cast<float>(sum * peak);
+    density_per_mm2[column] += static_cast<float>(sum * peak * power);
   }
 }
 
@@ -144,7 +145,7 @@ std::vector<float> LaserView::OnReference(std::span<const Spot> spots,
         for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
           const std::size_t at = map_.Index(0, row);
           for (const Spot& spot : spots) {
-            AddReferenceSpot(spot.centre_mm, row, &radiance[at]);
+            AddReferenceSpot(spot.centre_mm, spot.power, row, &radiance[at]);
           }
           for (int column = 0; column < map_.width; ++column) {
             radiance[map_.Index(column, row)] *= factor;

@@ -46,7 +46,10 @@ class LaserView {
     int end = 0;  // one past the last; none if not above begin
   };
   Columns Within(int row, PointMm centre, double radius_mm) const;
-  void AddReferenceSpot(PointMm centre, int row, float* density_per_mm2) const;
+  void AddReferenceSpot(PointMm centre,
+                        double power,
+                        int row,
+                        float* density_per_mm2) const;
 
   PlaneMap map_;
   std::shared_ptr<const Transport> sample_;

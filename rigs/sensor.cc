@@ -172,18 +172,51 @@ NACRE_SIMD_CLONES void Means(const float* __restrict rates,
 
 NACRE_SIMD_CLONES void Convert(const SensorModel& sensor,
                                const float* __restrict electrons,
+                               const float* __restrict row_electrons,
                                const std::uint32_t* __restrict word,
                                std::size_t count,
                                std::uint16_t* __restrict counts) {
+  const auto curve =
+      static_cast<float>(sensor.nonlinearity / sensor.full_well_electrons);
   const auto read_noise = static_cast<float>(sensor.read_noise_electrons);
   const auto per_electron = static_cast<float>(1 / sensor.electrons_per_count);
   const auto offset = static_cast<float>(sensor.offset_counts);
   const auto most = static_cast<float>(sensor.MaxCount());
   for (std::size_t k = 0; k < count; ++k) {
-    const float signal = electrons[k] + read_noise * Normal(word[k]);
+    const float kept = electrons[k] * (1.0F - curve * electrons[k]);
+    const float signal = kept + row_electrons[k] + read_noise * Normal(word[k]);
     const float value = offset + signal * per_electron;
     const float clipped = std::min(most, std::max(0.0F, value));
     counts[k] = static_cast<std::uint16_t>(static_cast<std::int32_t>(clipped + 0.5F));
+  }
+}
+
+// Of the pixels from `begin` on. A stream of its own, by the second word of the
+// counter.
+void DrawRows(const SensorModel& sensor,
+              const Exposure& exposure,
+              std::size_t begin,
+              std::size_t count,
+              float* row_electrons) {
+  std::fill_n(row_electrons, count, 0.0F);
+  if (sensor.row_noise_electrons <= 0 || exposure.row_px <= 0) {
+    return;
+  }
+  const auto width = static_cast<std::size_t>(exposure.row_px);
+  for (std::size_t k = 0; k < count;) {
+    const std::size_t row = (begin + k) / width;
+    const std::size_t end = std::min(count, (row + 1) * width - begin);
+    const auto word =
+        Philox({static_cast<std::uint32_t>(row),
+                0x726F7773U,
+                static_cast<std::uint32_t>(exposure.picture_number),
+                static_cast<std::uint32_t>(exposure.picture_number >> 32)},
+               {static_cast<std::uint32_t>(exposure.seed),
+                static_cast<std::uint32_t>(exposure.seed >> 32)})[0];
+    std::fill(row_electrons + k,
+              row_electrons + end,
+              static_cast<float>(sensor.row_noise_electrons) * Normal(word));
+    k = end;
   }
 }
 
@@ -216,7 +249,9 @@ void ExposePiece(const SensorModel& sensor,
       DrawFewElectrons(mean + at, draws.photon + at, most, size, electrons + at);
     }
   }
-  Convert(sensor, electrons, draws.read, count, counts.data());
+  float row_electrons[kPiece];
+  DrawRows(sensor, exposure, begin, count, row_electrons);
+  Convert(sensor, electrons, row_electrons, draws.read, count, counts.data());
 }
 
 }  // namespace

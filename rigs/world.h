@@ -8,10 +8,13 @@
 
 namespace nacre::rigs {
 
-/// One laser spot on the sample plane.
+/// One round laser spot.
 struct Spot {
-  PointMm centre_mm;
-  double cos_incidence = 1;
+  PointMm centre_mm = {};     ///< on the sample plane
+  double cos_incidence = 1;   ///< on the sample
+  double power = 1;           ///< share of a beam's nominal power
+  PointMm on_sample_mm = {};  ///< on the sample's surface, in its coordinates
+  int beam = 0;               ///< a beam that isn't round is more than one spot
 };
 
 /// What the parts of a simulated rig share: the stage and the laser write it, the
