@@ -3,7 +3,11 @@
 #include "cli/command_line.h"
 #include "core/error.h"
 #include "reconstruct/import/images.h"
+#include "reconstruct/import/npy.h"
 #include "reconstruct/import/psf.h"
+#ifdef NACRE_HAS_MAT
+#include "reconstruct/import/mat.h"
+#endif
 
 #include <filesystem>
 #include <memory>
@@ -21,6 +25,7 @@ struct Arguments {
   std::filesystem::path out;
   ImportOptions options;
   ImageImportOptions images;
+  reconstruct::ArrayImportOptions arrays;
 };
 
 ImportSummary RunImport(const Arguments& args, const Common& common) {
@@ -32,8 +37,20 @@ ImportSummary RunImport(const Arguments& args, const Common& common) {
     return reconstruct::ImportImages(
         args.file, args.out, args.options, args.images, progress);
   }
-  throw UsageError("--from " + args.from +
-                   ": not in this version, which reads psf and images");
+  if (args.from == "npy") {
+    return reconstruct::ImportNpy(
+        args.file, args.out, args.options, args.arrays, progress);
+  }
+  if (args.from == "mat") {
+#ifdef NACRE_HAS_MAT
+    return reconstruct::ImportMat(
+        args.file, args.out, args.options, args.arrays, progress);
+#else
+    throw UsageError(
+        "--from mat: this build has no libmatio; install it and build again");
+#endif
+  }
+  throw UsageError("--from " + args.from + ": not one of psf, images, npy and mat");
 }
 
 int Run(const Arguments& args, const Common& common) {
@@ -57,12 +74,13 @@ int Run(const Arguments& args, const Common& common) {
 
 std::function<int()> MakeImportVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
-  app.add_option("file", args->file, "psf: the file; images: the folder")->required();
-  app.add_option("--from", args->from, "psf or images")->required();
+  app.add_option("file", args->file, "the file; of images, the folder")->required();
+  app.add_option("--from", args->from, "psf, images, npy or mat")->required();
   app.add_option("-o,--out", args->out, "dataset to write, *.rd.exr")->required();
   AddOptions(app, args->options);
   app.get_option("--pitch-mm")->required();
   AddOptions(app, args->images);
+  AddOptions(app, args->arrays);
   return [args, &common] { return Run(*args, common); };
 }
 

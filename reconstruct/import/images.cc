@@ -282,7 +282,7 @@ ImportSummary ImportImages(const std::filesystem::path& folder,
   const ImageMap images = FindImages(folder, image_options);
   const RdHeader header = HeaderOf(images, options, image_options);
   RdWriter writer(to, header);
-  Cutter cutter{options, static_cast<float>(image_options.scale)};
+  Cutter cutter{options, static_cast<float>(options.scale)};
   RdSlice slice = MakeSlice(header);
   int width = 0;
   int height = 0;

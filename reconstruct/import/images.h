@@ -14,7 +14,6 @@ struct ImageImportOptions {
   std::string pattern = "*_{i}_{j}.*";
   int core = 0;
   int first = 0;
-  double scale = 1;
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -29,10 +28,6 @@ struct ImageImportOptions {
           "0: each picture is one window; else each is the whole frame, a cell a pixel "
           "and centred on the grid, and core x core windows are cut out of it");
     visit("first", self.first, Range{0, 1}, "the number of the first column and row");
-    visit("scale",
-          self.scale,
-          Range{0, 1e30},
-          "R_d in mm^-2 that the value 1 stands for");
   }
 };
 

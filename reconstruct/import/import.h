@@ -12,6 +12,7 @@ struct ImportOptions {
   double pitch_mm = 0;  ///< has no default: units aren't guessed
   double eta = 1;
   bool clamp_negative = false;
+  double scale = 1;
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -24,6 +25,10 @@ struct ImportOptions {
           self.clamp_negative,
           Range{},
           "read negative values as 0 and count them, instead of refusing the file");
+    visit("scale",
+          self.scale,
+          Range{0, 1e30},
+          "R_d in mm^-2 that the value 1 stands for");
   }
 };
 

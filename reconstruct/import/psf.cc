@@ -93,7 +93,8 @@ class RecordReader {
  private:
   float Checked(int i, int j, int c, int u, int v) {
     const std::size_t index = layout_.RecordIndex(c, u, v);
-    const auto value = std::bit_cast<float>(LoadLittle32(&bytes_[4 * index]));
+    const auto value = std::bit_cast<float>(LoadLittle32(&bytes_[4 * index])) *
+                       static_cast<float>(options_.scale);
     if (std::isfinite(value) && !(value < 0)) {
       return value;
     }

@@ -109,7 +109,9 @@ TEST(Images, Png16IsLinearAndScaled) {
   image.bit_depth = 16;
   image.values = {13107};  // a fifth of 65535
   WritePng(folder / "a_0_0.png", image);
-  ImportImages(folder.path(), folder / "x.rd.exr", Options(), {.scale = 10});
+  ImportOptions options = Options();
+  options.scale = 10;
+  ImportImages(folder.path(), folder / "x.rd.exr", options, {});
   const RdDataset dataset = ReadDataset(folder / "x.rd.exr");
   EXPECT_EQ(dataset.header.channels, std::vector<std::string>{"Y"});
   EXPECT_FLOAT_EQ(dataset.rd[0], 2.0F);
