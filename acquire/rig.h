@@ -25,7 +25,7 @@ struct GridDescription {
   double pitch_mm = 0;
   int core = 0;  ///< odd; cells a side of the window around each point
   /// Corners of a polygon: points outside of it aren't captured. Empty: all are.
-  std::vector<PointMm> outline_mm;
+  std::vector<PointMm> outline_mm = {};
 
   std::int64_t PointCount() const { return std::int64_t{points_x} * points_y; }
   /// Column i from the left, row j from the top.
@@ -84,7 +84,7 @@ struct ScheduleDescription {
 struct AdaptiveDescription {
   bool skip_exposures = true;  ///< that add nothing
   bool skip_empty = true;      ///< grid points around which nothing scatters
-  double noise_sigmas = 5;     ///< of the dark pictures: what is above is light
+  double noise_sigmas = 20;    ///< of the dark: what is above needs no longer exposure
 };
 
 /// A rig and what is to be captured with it, as written in rig.toml.
