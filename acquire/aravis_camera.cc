@@ -89,7 +89,14 @@ struct AravisCamera::Parts {
     connection = std::move(opened);
   }
 
+  void Tell(bool away) const {
+    if (listener) {
+      listener(away);
+    }
+  }
+
   void Reconnect(const std::string& reason) {
+    Tell(/*away=*/true);
     Close();
     const auto deadline =
         Clock::now() + std::chrono::duration<double>(options.reconnect_s);
@@ -99,6 +106,7 @@ struct AravisCamera::Parts {
       try {
         Open();
         ++statistics.reconnections;
+        Tell(/*away=*/false);
         return;
       } catch (const Error& e) {
         message = e.what();
@@ -137,6 +145,7 @@ struct AravisCamera::Parts {
   const CameraInfo info;
   std::optional<double> exposure_us;  // as asked for
   double applied_exposure_us = 0;
+  std::function<void(bool)> listener;
   std::future<void> closing;
 };
 
@@ -163,19 +172,32 @@ double AravisCamera::SetExposureUs(double exposure_us) {
   return applied_us;
 }
 
-std::optional<Frame> AravisCamera::Capture(std::uint64_t,
+std::optional<Frame> AravisCamera::Capture(std::uint64_t picture_number,
                                            std::chrono::milliseconds timeout) {
+  std::optional<PackedFrame> packed = CapturePacked(picture_number, timeout);
+  if (!packed) {
+    return std::nullopt;
+  }
+  return std::move(*packed).Unpacked();
+}
+
+std::optional<PackedFrame> AravisCamera::CapturePacked(
+    std::uint64_t picture_number, std::chrono::milliseconds timeout) {
   parts_->RequireConnection();
   try {
-    std::optional<Frame> frame = parts_->connection->Capture(timeout);
-    if (frame) {
-      frame->exposure_us = parts_->applied_exposure_us;
+    auto packed = parts_->connection->Capture(picture_number, timeout);
+    if (packed) {
+      packed->frame.exposure_us = parts_->applied_exposure_us;
     }
-    return frame;
+    return packed;
   } catch (const Error& e) {
     parts_->Recover(e);
   }
   return std::nullopt;
+}
+
+void AravisCamera::OnAway(std::function<void(bool away)> listener) {
+  parts_->listener = std::move(listener);
 }
 
 CameraStatistics AravisCamera::Statistics() const {

@@ -55,6 +55,9 @@ class AravisCamera final : public Camera {
   /// With a hardware trigger: the next pulse's frame.
   std::optional<Frame> Capture(std::uint64_t picture_number,
                                std::chrono::milliseconds timeout) override;
+  std::optional<PackedFrame> CapturePacked(std::uint64_t picture_number,
+                                           std::chrono::milliseconds timeout) override;
+  void OnAway(std::function<void(bool away)> listener) override;
 
   CameraStatistics Statistics() const;
 

@@ -16,7 +16,7 @@ struct SensorRegion {
 /// How a GigE Vision or USB3 Vision camera is to be found and set.
 struct AravisOptions {
   std::string id;  ///< "vendor-serial" as `nacre doctor` lists it, or an IP address
-  std::string pixel_format = "Mono12";  ///< one of MonoFormatNames()
+  std::string pixel_format = "Mono12";  ///< one of PixelFormatNames()
   std::string trigger = "Software";     ///< or an input of the camera: "Line1", …
   std::optional<double> gain =
       std::nullopt;  ///< in the camera's unit; else left as it is

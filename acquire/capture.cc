@@ -1,128 +1,103 @@
 #include "acquire/capture.h"
 
 #include "acquire/internal/frame_queue.h"
+#include "acquire/internal/rig_state.h"
 #include "core/error.h"
 
+#include <algorithm>
 #include <chrono>
-#include <cmath>
-#include <fmt/format.h>
-#include <vector>
 
 namespace nacre::acquire {
 namespace {
 
-constexpr int kAttempts = 4;  // a lost frame is asked for three times again
-constexpr std::size_t kQueuedFrames = 4;
-constexpr std::chrono::seconds kTimeoutBeyondExposure{5};
-
-// Leaves the laser dark however the capture ends.
-class BlankOnExit {
- public:
-  explicit BlankOnExit(Illuminator& illuminator) : illuminator_(illuminator) {}
-  ~BlankOnExit() { illuminator_.Blank(); }
-  BlankOnExit(const BlankOnExit&) = delete;
-  BlankOnExit& operator=(const BlankOnExit&) = delete;
-
- private:
-  Illuminator& illuminator_;
-};
-
-// Brings the rig into the state that a picture asks for, changing only what differs.
-class RigState {
- public:
-  RigState(const SessionWriter& session, const Devices& devices, const ScanMap* map)
-      : session_(session), devices_(devices), map_(map) {}
-
-  // Returns the exposure that the camera applies.
-  double Set(const ScheduledPicture& picture) {
-    if (!known_ || last_.target != picture.target || last_.pose != picture.pose) {
-      devices_.illuminator.Blank();  // whoever reaches into the rig meets no beam
-      known_ = false;
-      devices_.stage.Place(picture.target, picture.pose);
-      SetLight(picture);
-    } else if (last_.channel != picture.channel || last_.group != picture.group) {
-      SetLight(picture);
-    }
-    if (!known_ || last_.exposure_us != picture.exposure_us) {
-      applied_exposure_us_ = devices_.camera.SetExposureUs(picture.exposure_us);
-    }
-    last_ = picture;
-    known_ = true;
-    return applied_exposure_us_;
-  }
-
- private:
-  void SetLight(const ScheduledPicture& picture) {
-    if (picture.channel < 0) {
-      devices_.illuminator.Blank();
-    } else if (picture.group < 0) {
-      devices_.illuminator.Light(session_.schedule().lattice(), picture.channel);
-    } else {
-      std::vector<ScanAngle> spots;
-      for (const GridIndex index : session_.schedule().Group(picture.group)) {
-        spots.push_back(
-            map_->AngleFromSample(session_.rig().grid.Point(index.i, index.j)));
-      }
-      devices_.illuminator.Light(spots, picture.channel);
-    }
-  }
-
-  const SessionWriter& session_;
-  const Devices& devices_;
-  const ScanMap* map_;
-  ScheduledPicture last_;
-  bool known_ = false;  // whether last_ is what the rig is in
-  double applied_exposure_us_ = 0;
-};
-
-Frame TakePicture(Camera& camera,
-                  std::int64_t number,
-                  double exposure_us,
-                  std::int64_t& frames_lost) {
-  const auto timeout =
-      kTimeoutBeyondExposure +
-      std::chrono::milliseconds(static_cast<std::int64_t>(exposure_us / 1000));
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (auto frame = camera.Capture(static_cast<std::uint64_t>(number), timeout)) {
-      frame->exposure_us = exposure_us;
-      return std::move(*frame);
-    }
-    ++frames_lost;
-  }
-  throw DeviceError(fmt::format(
-      "picture {}: the camera lost the frame {} times; see to its cable and its host's "
-      "load, then resume the capture",
-      number,
-      kAttempts));
+std::size_t QueuedFrames(const CameraInfo& camera, const CaptureOptions& options) {
+  const std::size_t frame_bytes = 2 * static_cast<std::size_t>(camera.width) *
+                                  static_cast<std::size_t>(camera.height) *
+                                  static_cast<std::size_t>(camera.SamplesPerPixel());
+  return std::max<std::size_t>(
+      4, options.queue_bytes / std::max<std::size_t>(1, frame_bytes));
 }
 
-// Takes pictures up to `end`; `map` aims at the sample.
+// One run from the first missing picture up to `end`.
+class Run {
+ public:
+  Run(SessionWriter& session,
+      const Devices& devices,
+      const ScanMap* map,
+      const ProgressFunction& progress,
+      const CaptureOptions& options)
+      : session_(session),
+        progress_(progress),
+        options_(options),
+        stage_(map == nullptr ? "targets" : "capture"),
+        queue_(session,
+               QueuedFrames(session.manifest().camera, options),
+               options.on_frame),
+        state_(session, devices, map) {}
+
+  void TakeUntil(std::int64_t end) {
+    for (std::int64_t number = session_.picture_count(); number < end; ++number) {
+      const ScheduledPicture& picture = session_.schedule()[number];
+      const std::string skipped = WhyNot(number);
+      if (skipped.empty()) {
+        queue_.Push(state_.Take(number, summary_));
+        ++summary_.pictures_taken;
+      } else {
+        queue_.PushSkip(skipped);
+        ++summary_.pictures_skipped;
+      }
+      Report(progress_,
+             {.stage = stage_,
+              .done = number + 1,
+              .total = session_.schedule().size(),
+              .note = Name(picture.target)});
+    }
+  }
+
+  CaptureSummary Finish() {
+    queue_.Finish();
+    summary_.waits_for_disk = queue_.times_full();
+    return summary_;
+  }
+
+ private:
+  // Why an adaptive capture needn't take the next picture.
+  std::string WhyNot(std::int64_t number) {
+    if (!session_.rig().adaptive || session_.schedule()[number].group < 1) {
+      return "";  // the first group is the preview
+    }
+    const auto settle = [this] { queue_.WaitUntilWritten(); };
+    if (!session_.manifest().adaptive_plan) {
+      settle();
+      session_.SetAdaptivePlan(PlanFromPreview(SessionReader(session_.folder()),
+                                               options_.pixel_from_sample));
+    }
+    return WhySkip(session_, number, settle);
+  }
+
+  SessionWriter& session_;
+  const ProgressFunction& progress_;
+  const CaptureOptions& options_;
+  const std::string stage_;
+  CaptureSummary summary_;
+  internal::FrameQueue queue_;
+  internal::RigState
+      state_;  // last, so that the laser is dark before the queue runs empty
+};
+
 CaptureSummary Capture(SessionWriter& session,
                        const Devices& devices,
                        std::int64_t end,
                        const ScanMap* map,
-                       const ProgressFunction& progress) {
+                       const ProgressFunction& progress,
+                       const CaptureOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const std::int64_t begin = session.picture_count();
-  const std::string stage = map == nullptr ? "targets" : "capture";
   CaptureSummary summary;
-  if (begin < end) {
-    internal::FrameQueue queue(session, kQueuedFrames);
-    const BlankOnExit blank(devices.illuminator);  // before the queue runs empty
-    RigState state(session, devices, map);
-    for (std::int64_t number = begin; number < end; ++number) {
-      const ScheduledPicture& picture = session.schedule()[number];
-      const double exposure_us = state.Set(picture);
-      queue.Push(TakePicture(devices.camera, number, exposure_us, summary.frames_lost));
-      ++summary.pictures_taken;
-      Report(progress,
-             {.stage = stage,
-              .done = number + 1,
-              .total = session.schedule().size(),
-              .note = Name(picture.target)});
-    }
+  if (session.picture_count() < end) {
+    Run run(session, devices, map, progress, options);
+    run.TakeUntil(end);
     devices.illuminator.Blank();
-    queue.Finish();
+    summary = run.Finish();
   }
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -133,18 +108,21 @@ CaptureSummary Capture(SessionWriter& session,
 
 CaptureSummary CaptureCalibration(SessionWriter& session,
                                   const Devices& devices,
-                                  const ProgressFunction& progress) {
-  return Capture(session, devices, session.schedule().grid_begin(), nullptr, progress);
+                                  const ProgressFunction& progress,
+                                  const CaptureOptions& options) {
+  return Capture(
+      session, devices, session.schedule().grid_begin(), nullptr, progress, options);
 }
 
 CaptureSummary CaptureGrid(SessionWriter& session,
                            const Devices& devices,
                            const ScanMap& map,
-                           const ProgressFunction& progress) {
+                           const ProgressFunction& progress,
+                           const CaptureOptions& options) {
   Expect(session.picture_count() >= session.schedule().grid_begin(),
          "the calibration pictures come first");
   session.SetScanMap(map);
-  return Capture(session, devices, session.schedule().size(), &map, progress);
+  return Capture(session, devices, session.schedule().size(), &map, progress, options);
 }
 
 CapturePlan PlanCapture(const RigDescription& rig, const CameraInfo& camera) {

@@ -55,11 +55,33 @@ std::optional<JournalEntry> ParseLine(std::string_view line,
        Get<std::vector<std::pair<int, int>>>(json, "spots", origin)) {
     entry.spots.push_back({i, j});
   }
+  if (json.contains("skipped")) {
+    entry.skipped = Get<std::string>(json, "skipped", origin);
+    if (entry.skipped.empty()) {
+      throw BadData(origin + ": field 'skipped': no reason");
+    }
+    return entry;
+  }
   entry.exposure_us = Get<double>(json, "applied_exposure_us", origin);
   entry.file = Get<std::string>(json, "file", origin);
   entry.hash = Get<std::string>(json, "xxh3", origin);
   entry.frame_id = Get<std::uint64_t>(json, "frame_id", origin);
   entry.timestamp_ns = Get<std::int64_t>(json, "timestamp_ns", origin);
+  // Fields that came later, or that not every camera has.
+  if (json.contains("attempts")) {
+    entry.attempts = Get<int>(json, "attempts", origin);
+    entry.largest = Get<int>(json, "largest", origin);
+    entry.bright = Get<std::int64_t>(json, "bright", origin);
+  }
+  if (json.contains("resent_packets")) {
+    entry.resent_packets = Get<std::uint64_t>(json, "resent_packets", origin);
+  }
+  if (json.contains("gain")) {
+    entry.gain = Get<double>(json, "gain", origin);
+  }
+  if (json.contains("temperature_c")) {
+    entry.temperature_c = Get<double>(json, "temperature_c", origin);
+  }
   return entry;
 }
 
@@ -70,21 +92,36 @@ std::string FormatJournalLine(const JournalEntry& entry) {
   for (const GridIndex& spot : entry.spots) {
     spots.push_back({spot.i, spot.j});
   }
-  const std::string text = Json{
-      {"number", entry.number},
-      {"target", Name(entry.picture.target)},
-      {"pose", entry.picture.pose},
-      {"channel", entry.picture.channel},
-      {"group", entry.picture.group},
-      {"repeat", entry.picture.repeat},
-      {"spots", spots},
-      {"exposure_us", entry.picture.exposure_us},
-      {"applied_exposure_us", entry.exposure_us},
-      {"file", entry.file},
-      {"xxh3", entry.hash},
-      {"frame_id", entry.frame_id},
-      {"timestamp_ns",
-       entry.timestamp_ns}}.dump();
+  Json json{{"number", entry.number},
+            {"target", Name(entry.picture.target)},
+            {"pose", entry.picture.pose},
+            {"channel", entry.picture.channel},
+            {"group", entry.picture.group},
+            {"repeat", entry.picture.repeat},
+            {"spots", spots},
+            {"exposure_us", entry.picture.exposure_us}};
+  if (!entry.taken()) {
+    json["skipped"] = entry.skipped;
+  } else {
+    json["applied_exposure_us"] = entry.exposure_us;
+    json["file"] = entry.file;
+    json["xxh3"] = entry.hash;
+    json["frame_id"] = entry.frame_id;
+    json["timestamp_ns"] = entry.timestamp_ns;
+    json["attempts"] = entry.attempts;
+    json["largest"] = entry.largest;
+    json["bright"] = entry.bright;
+    if (entry.resent_packets > 0) {
+      json["resent_packets"] = entry.resent_packets;
+    }
+    if (entry.gain) {
+      json["gain"] = *entry.gain;
+    }
+    if (entry.temperature_c) {
+      json["temperature_c"] = *entry.temperature_c;
+    }
+  }
+  const std::string text = json.dump();
   return text + '\t' + HashHex(text.data(), text.size()) + '\n';
 }
 
@@ -117,6 +154,7 @@ Journal ParseJournal(const std::string& text, const std::string& origin) {
     } else {
       journal.entries.push_back(*entry);
       journal.good_bytes = end + 1;
+      journal.line_ends.push_back(end + 1);
     }
     begin = end == std::string::npos ? text.size() : end + 1;
   }

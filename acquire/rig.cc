@@ -1,6 +1,6 @@
 #include "acquire/rig.h"
 
-#include "acquire/mono_format.h"
+#include "acquire/pixel_format.h"
 #include "core/atomic_file.h"
 #include "core/hash.h"
 
@@ -56,8 +56,39 @@ GridDescription ReadGrid(const TomlTable& table) {
                                "it must be odd",
                                grid.core));
   }
+  if (table.Has("outline_mm")) {
+    const std::vector<double> corners = table.Numbers("outline_mm", Range{-1e4, 1e4});
+    if (corners.size() < 6 || corners.size() % 2 != 0) {
+      throw table.At("outline_mm", "expected [x, y, x, y, …] of three corners or more");
+    }
+    for (std::size_t k = 0; k < corners.size(); k += 2) {
+      grid.outline_mm.push_back({corners[k], corners[k + 1]});
+    }
+    bool any = false;
+    for (int j = 0; j < grid.points_y; ++j) {
+      for (int i = 0; i < grid.points_x; ++i) {
+        any = any || grid.Includes(i, j);
+      }
+    }
+    if (!any) {
+      throw table.At("outline_mm", "no grid point lies inside");
+    }
+  }
   table.RejectUnknownKeys();
   return grid;
+}
+
+std::optional<AdaptiveDescription> ReadAdaptive(const std::optional<TomlTable>& table) {
+  if (!table) {
+    return std::nullopt;
+  }
+  AdaptiveDescription adaptive;
+  adaptive.skip_exposures = table->Boolean("skip_exposures", adaptive.skip_exposures);
+  adaptive.skip_empty = table->Boolean("skip_empty", adaptive.skip_empty);
+  adaptive.noise_sigmas =
+      table->Number("noise_sigmas", adaptive.noise_sigmas, Range{3, 100});
+  table->RejectUnknownKeys();
+  return adaptive;
 }
 
 SensorRegion ReadRegion(const TomlTable& table) {
@@ -80,15 +111,11 @@ AravisOptions ReadDevice(const TomlTable& table) {
     throw table.At("id", "is empty; `nacre doctor` lists the cameras that answer");
   }
   device.pixel_format = table.Text("pixel_format", device.pixel_format);
-  const MonoFormat* format = FindMonoFormat(device.pixel_format);
+  const PixelFormat* format = FindPixelFormat(device.pixel_format);
   if (format == nullptr) {
     throw table.At(
         "pixel_format",
-        fmt::format("'{}' isn't one of {}", device.pixel_format, MonoFormatNames()));
-  }
-  if (format->bit_depth <= 8) {
-    throw table.At("pixel_format",
-                   "eight bits are too few for what falls off by decades");
+        fmt::format("'{}' isn't one of {}", device.pixel_format, PixelFormatNames()));
   }
   device.trigger = table.Text("trigger", device.trigger);
   if (table.Has("gain")) {
@@ -206,6 +233,24 @@ ScheduleDescription ReadSchedule(const std::optional<TomlTable>& table, int core
 
 }  // namespace
 
+// Even-odd rule: whether a ray to the right crosses an odd number of sides.
+bool GridDescription::Includes(int i, int j) const {
+  if (outline_mm.empty()) {
+    return true;
+  }
+  const PointMm p = Point(i, j);
+  bool inside = false;
+  for (std::size_t k = 0; k < outline_mm.size(); ++k) {
+    const PointMm a = outline_mm[k];
+    const PointMm b = outline_mm[(k + 1) % outline_mm.size()];
+    if ((a.y > p.y) != (b.y > p.y) &&
+        p.x < a.x + (b.x - a.x) * (p.y - a.y) / (b.y - a.y)) {
+      inside = !inside;
+    }
+  }
+  return inside;
+}
+
 RigDescription ParseRig(const std::string& text, const std::filesystem::path& path) {
   const TomlTable root = TomlTable::FromText(text, path.string());
   RigDescription rig;
@@ -234,9 +279,8 @@ RigDescription ParseRig(const std::string& text, const std::filesystem::path& pa
   rig.targets = ReadTargets(root.Table("targets"));
   rig.scanner = ReadScanner(root.Table("scanner"));
   rig.schedule = ReadSchedule(root.FindTable("schedule"), rig.grid.core);
-  if (!is_hardware) {
-    root.Has("simulated");  // belongs to rigs/, which checks it
-  }
+  rig.adaptive = ReadAdaptive(root.FindTable("adaptive"));
+  root.Has("simulated");  // belongs to rigs/, which checks it
   root.RejectUnknownKeys();
   return rig;
 }

@@ -23,7 +23,8 @@ Json ToJson(const CameraInfo& camera) {
               {"height_px", camera.height},
               {"bit_depth", camera.bit_depth},
               {"min_exposure_us", camera.min_exposure_us},
-              {"max_exposure_us", camera.max_exposure_us}};
+              {"max_exposure_us", camera.max_exposure_us},
+              {"mosaic", camera.mosaic}};
 }
 
 CameraInfo CameraFromJson(const Json& json, const std::string& origin) {
@@ -33,9 +34,12 @@ CameraInfo CameraFromJson(const Json& json, const std::string& origin) {
                     .height = Get<int>(json, "height_px", origin),
                     .bit_depth = Get<int>(json, "bit_depth", origin),
                     .min_exposure_us = Get<double>(json, "min_exposure_us", origin),
-                    .max_exposure_us = Get<double>(json, "max_exposure_us", origin)};
+                    .max_exposure_us = Get<double>(json, "max_exposure_us", origin),
+                    .mosaic = json.contains("mosaic")
+                                  ? Get<std::string>(json, "mosaic", origin)
+                                  : ""};
   if (camera.width < 1 || camera.height < 1 || camera.width > 1 << 16 ||
-      camera.height > 1 << 16 || camera.bit_depth < 9 || camera.bit_depth > 16) {
+      camera.height > 1 << 16 || camera.bit_depth < 8 || camera.bit_depth > 16) {
     throw BadData(origin + ": field 'camera': no such sensor");
   }
   return camera;
@@ -55,9 +59,43 @@ IlluminatorInfo IlluminatorFromJson(const Json& json, const std::string& origin)
           .max_angle_rad = Get<double>(json, "max_angle_rad", origin)};
 }
 
+Json ToJson(const AdaptivePlan& plan) {
+  Json points = Json::array();
+  for (const GridIndex& point : plan.empty_points) {
+    points.push_back({point.i, point.j});
+  }
+  return Json{{"omitted_exposures", plan.omitted_exposures}, {"empty_points", points}};
+}
+
+AdaptivePlan PlanFromJson(const Json& json, const std::string& origin) {
+  AdaptivePlan plan;
+  plan.omitted_exposures = Get<std::vector<int>>(json, "omitted_exposures", origin);
+  for (const auto& [i, j] :
+       Get<std::vector<std::pair<int, int>>>(json, "empty_points", origin)) {
+    plan.empty_points.push_back({i, j});
+  }
+  return plan;
+}
+
 RigDescription RigOf(const SessionManifest& manifest,
                      const std::filesystem::path& folder) {
   return ParseRig(manifest.rig_text, folder / manifest.rig_file);
+}
+
+// Whether `spots` are points of `group` in its order; all of them unless the capture
+// was adaptive.
+bool AreOfGroup(const std::vector<GridIndex>& spots,
+                std::span<const GridIndex> group,
+                bool all) {
+  auto at = group.begin();
+  for (const GridIndex& spot : spots) {
+    at = std::find(at, group.end(), spot);
+    if (at == group.end()) {
+      return false;
+    }
+    ++at;
+  }
+  return !all || spots.size() == group.size();
 }
 
 bool SamePicture(const ScheduledPicture& a, const ScheduledPicture& b) {
@@ -102,28 +140,34 @@ SessionManifest ReadManifest(const std::filesystem::path& folder) {
   if (!map.is_null()) {
     manifest.scan_map = ScanMapFromJson(map, origin + ": scan_map");
   }
+  if (json.contains("adaptive_plan")) {
+    manifest.adaptive_plan =
+        PlanFromJson(json["adaptive_plan"], origin + ": adaptive_plan");
+  }
   return manifest;
 }
 
 void WriteManifest(const std::filesystem::path& folder,
                    const SessionManifest& manifest) {
   const Schedule schedule(RigOf(manifest, folder));
-  WriteJson(
-      folder / "session.json",
-      Json{{"format", kFormat},
-           {"format_version", kFormatVersion},
-           {"software_version", manifest.software_version},
-           {"rig_file", manifest.rig_file},
-           {"rig_xxh3", manifest.rig_hash},
-           {"rig", manifest.rig_text},
-           {"seed", manifest.seed ? Json(*manifest.seed) : Json()},
-           {"picture_count", manifest.picture_count},
-           {"first_sample_picture", schedule.grid_begin()},
-           {"spot_groups", schedule.group_count()},
-           {"exposures_us", schedule.exposures_us()},
-           {"camera", ToJson(manifest.camera)},
-           {"illuminator", ToJson(manifest.illuminator)},
-           {"scan_map", manifest.scan_map ? ToJson(*manifest.scan_map) : Json()}});
+  Json json{{"format", kFormat},
+            {"format_version", kFormatVersion},
+            {"software_version", manifest.software_version},
+            {"rig_file", manifest.rig_file},
+            {"rig_xxh3", manifest.rig_hash},
+            {"rig", manifest.rig_text},
+            {"seed", manifest.seed ? Json(*manifest.seed) : Json()},
+            {"picture_count", manifest.picture_count},
+            {"first_sample_picture", schedule.grid_begin()},
+            {"spot_groups", schedule.group_count()},
+            {"exposures_us", schedule.exposures_us()},
+            {"camera", ToJson(manifest.camera)},
+            {"illuminator", ToJson(manifest.illuminator)},
+            {"scan_map", manifest.scan_map ? ToJson(*manifest.scan_map) : Json()}};
+  if (manifest.adaptive_plan) {
+    json["adaptive_plan"] = ToJson(*manifest.adaptive_plan);
+  }
+  WriteJson(folder / "session.json", json);
 }
 
 SessionReader::SessionReader(std::filesystem::path folder)
@@ -148,10 +192,11 @@ SessionReader::SessionReader(std::filesystem::path folder)
     const ScheduledPicture& picture = schedule_[entry.number];
     const auto group = picture.group >= 0 ? schedule_.Group(picture.group)
                                           : std::span<const GridIndex>();
-    if (entry.file != FrameFileName(entry.number) ||
+    const bool adaptive = manifest_.adaptive_plan.has_value();
+    const bool may_be_skipped = adaptive && picture.target == Target::kSample;
+    if ((entry.taken() ? entry.file != FrameFileName(entry.number) : !may_be_skipped) ||
         !SamePicture(entry.picture, picture) ||
-        !std::equal(
-            entry.spots.begin(), entry.spots.end(), group.begin(), group.end())) {
+        !AreOfGroup(entry.spots, group, entry.taken() && !adaptive)) {
       throw BadData(
           fmt::format("{}:{}: picture {} isn't the one that the schedule calls for",
                       path.string(),
@@ -175,6 +220,10 @@ const JournalEntry& SessionReader::Entry(std::int64_t number) const {
 
 Frame SessionReader::ReadFrame(std::int64_t number) const {
   const JournalEntry& entry = Entry(number);
+  if (!entry.taken()) {
+    throw BadData(fmt::format(
+        "{}: picture {} was left out: {}", folder_.string(), number, entry.skipped));
+  }
   const std::filesystem::path path = folder_ / entry.file;
   const std::string bytes = ReadFile(path);
   if (HashHex(bytes.data(), bytes.size()) != entry.hash) {
@@ -183,8 +232,12 @@ Frame SessionReader::ReadFrame(std::int64_t number) const {
                   "changed after the capture");
   }
   Frame frame = DecodeFrame(bytes, path.string());
+  const std::size_t pixels =
+      static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
   if (frame.width != manifest_.camera.width ||
-      frame.height != manifest_.camera.height) {
+      frame.height != manifest_.camera.height ||
+      frame.counts.size() !=
+          pixels * static_cast<std::size_t>(manifest_.camera.SamplesPerPixel())) {
     throw BadData(fmt::format("{}: {} x {} pixels, but the camera has {} x {}",
                               path.string(),
                               frame.width,
@@ -195,6 +248,8 @@ Frame SessionReader::ReadFrame(std::int64_t number) const {
   frame.exposure_us = entry.exposure_us;
   frame.frame_id = entry.frame_id;
   frame.timestamp_ns = entry.timestamp_ns;
+  frame.gain = entry.gain;
+  frame.temperature_c = entry.temperature_c;
   return frame;
 }
 

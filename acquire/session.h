@@ -1,5 +1,6 @@
 #pragma once
 
+#include "acquire/adaptive_plan.h"
 #include "acquire/camera.h"
 #include "acquire/illuminator.h"
 #include "acquire/journal.h"
@@ -26,6 +27,8 @@ struct SessionManifest {
   std::optional<ScanMap> scan_map;  ///< once the calibration pictures are taken
   /// Of a simulated rig's noise, if another than the rig description's.
   std::optional<std::uint64_t> seed;
+  /// Of an adaptive capture, once the preview of the sample is taken.
+  std::optional<AdaptivePlan> adaptive_plan = std::nullopt;
   std::string software_version;  ///< that began the session
 };
 
@@ -53,16 +56,21 @@ class SessionReader {
   const RigDescription& rig() const { return rig_; }
   const Schedule& schedule() const { return schedule_; }
 
-  /// How many pictures were taken: the numbers below it are there, the others not.
+  /// How many pictures were taken, or skipped by an adaptive capture: the numbers below
+  /// it are there, the others not.
   std::int64_t picture_count() const {
     return static_cast<std::int64_t>(journal_.size());
   }
   bool IsComplete() const { return picture_count() == schedule_.size(); }
 
-  /// Throws BadData if the picture wasn't taken (resume the capture).
+  /// Throws BadData if the capture didn't come that far (resume it).
   const JournalEntry& Entry(std::int64_t number) const;
 
+  /// False for a picture that an adaptive capture left out. BadData as Entry.
+  bool WasTaken(std::int64_t number) const { return Entry(number).taken(); }
+
   /// Reads a picture and verifies checksum and size; exposure_us is the one applied.
+  /// BadData for one that was skipped.
   Frame ReadFrame(std::int64_t number) const;
 
  private:

@@ -80,7 +80,8 @@ void RequireSame(const std::filesystem::path& folder,
       before.camera.serial != now.camera.serial ||
       before.camera.width != now.camera.width ||
       before.camera.height != now.camera.height ||
-      before.camera.bit_depth != now.camera.bit_depth) {
+      before.camera.bit_depth != now.camera.bit_depth ||
+      before.camera.mosaic != now.camera.mosaic) {
     refuse(fmt::format("it was begun with the camera {} {} and this is {} {}",
                        before.camera.model,
                        before.camera.serial,
@@ -106,7 +107,35 @@ void RequireSame(const std::filesystem::path& folder,
   }
 }
 
+struct CountFigures {
+  std::uint16_t largest = 0;
+  std::int64_t bright = 0;
+};
+
+__attribute__((target_clones("avx2", "default"))) CountFigures Figures(
+    const std::vector<std::uint16_t>& counts, int bit_depth) {
+  std::uint16_t first_bright = 0;  // IsBright is monotonic
+  while (!IsBright(first_bright, bit_depth)) {
+    ++first_bright;
+  }
+  CountFigures figures;
+  constexpr std::size_t kBlock = 16384;  // whose bright ones a small counter can hold
+  for (std::size_t begin = 0; begin < counts.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, counts.size());
+    std::uint16_t bright = 0;
+    for (std::size_t k = begin; k < end; ++k) {
+      figures.largest = std::max(figures.largest, counts[k]);
+      bright = static_cast<std::uint16_t>(bright + (counts[k] >= first_bright ? 1 : 0));
+    }
+    figures.bright += bright;
+  }
+  return figures;
+}
+
 bool IsGoodFrame(const std::filesystem::path& folder, const JournalEntry& entry) {
+  if (!entry.taken()) {
+    return true;
+  }
   const std::filesystem::path path = folder / entry.file;
   return entry.file == FrameFileName(entry.number) &&
          std::filesystem::is_regular_file(path) && HashFile(path) == entry.hash;
@@ -175,36 +204,70 @@ SessionWriter SessionWriter::Resume(const std::filesystem::path& folder,
   Journal journal = ParseJournal(ReadFile(path), path.string());
   writer.VerifyFrames(journal, progress);
   writer.journal_ = std::make_unique<JournalWriter>(path, journal.good_bytes);
-  writer.picture_count_ = std::ssize(journal.entries);
+  writer.entries_ = std::move(journal.entries);
   return writer;
 }
 
 void SessionWriter::VerifyFrames(Journal& journal, const ProgressFunction& progress) {
   const std::int64_t total = std::ssize(journal.entries);
-  std::uint64_t good_bytes = 0;
   for (std::int64_t k = 0; k < total; ++k) {
     const JournalEntry& entry = journal.entries[static_cast<std::size_t>(k)];
     if (!IsGoodFrame(folder_, entry)) {
       dropped_count_ = total - k;
       journal.entries.resize(static_cast<std::size_t>(k));
-      journal.good_bytes = good_bytes;
+      journal.good_bytes =
+          k == 0 ? 0 : journal.line_ends[static_cast<std::size_t>(k - 1)];
       return;
     }
-    good_bytes += FormatJournalLine(entry).size();
     Report(progress, {.stage = "verify", .done = k + 1, .total = total, .note = ""});
   }
 }
 
+std::vector<GridIndex> SessionWriter::LitPoints(int group) const {
+  std::vector<GridIndex> lit;
+  for (const GridIndex& point : schedule_.Group(group)) {
+    const bool is_empty =
+        manifest_.adaptive_plan &&
+        std::find(manifest_.adaptive_plan->empty_points.begin(),
+                  manifest_.adaptive_plan->empty_points.end(),
+                  point) != manifest_.adaptive_plan->empty_points.end();
+    if (!is_empty) {
+      lit.push_back(point);
+    }
+  }
+  return lit;
+}
+
+JournalEntry SessionWriter::NextEntry() const {
+  Expect(picture_count() < schedule_.size(), "a picture that is scheduled");
+  JournalEntry entry;
+  entry.number = picture_count();
+  entry.picture = schedule_[entry.number];
+  if (entry.picture.group >= 0) {
+    entry.spots = LitPoints(entry.picture.group);
+  }
+  return entry;
+}
+
+void SessionWriter::Commit(JournalEntry entry) {
+  journal_->Append(entry);
+  if (durable_) {
+    journal_->Flush();
+  }
+  entries_.push_back(std::move(entry));
+}
+
 void SessionWriter::Append(const Frame& frame) {
-  Expect(picture_count_ < schedule_.size(), "a picture that is scheduled");
+  JournalEntry entry = NextEntry();
   const CameraInfo& camera = manifest_.camera;
-  const std::size_t pixel_count =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t count = static_cast<std::size_t>(camera.width) *
+                            static_cast<std::size_t>(camera.height) *
+                            static_cast<std::size_t>(camera.SamplesPerPixel());
   if (frame.width != camera.width || frame.height != camera.height ||
-      frame.counts.size() != pixel_count) {
+      frame.counts.size() != count) {
     throw DeviceError(fmt::format(
         "picture {}: the camera {} announced {} x {} pixels and delivered {} x {} ({})",
-        picture_count_,
+        entry.number,
         camera.model,
         camera.width,
         camera.height,
@@ -212,32 +275,35 @@ void SessionWriter::Append(const Frame& frame) {
         frame.height,
         frame.counts.size()));
   }
-  const auto largest = *std::max_element(frame.counts.begin(), frame.counts.end());
-  if (largest >= 1 << camera.bit_depth) {
+  const CountFigures figures = Figures(frame.counts, camera.bit_depth);
+  if (figures.largest >= 1 << camera.bit_depth) {
     throw DeviceError(fmt::format("picture {}: a count of {} from a camera of {} bits",
-                                  picture_count_,
-                                  largest,
+                                  entry.number,
+                                  figures.largest,
                                   camera.bit_depth));
   }
   const std::string bytes = EncodeFrame(frame, camera.bit_depth);
-  JournalEntry entry;
-  entry.number = picture_count_;
-  entry.picture = schedule_[picture_count_];
-  if (entry.picture.group >= 0) {
-    const auto group = schedule_.Group(entry.picture.group);
-    entry.spots.assign(group.begin(), group.end());
-  }
   entry.exposure_us = frame.exposure_us;
-  entry.file = FrameFileName(picture_count_);
+  entry.file = FrameFileName(entry.number);
   entry.hash = HashHex(bytes.data(), bytes.size());
   entry.frame_id = frame.frame_id;
   entry.timestamp_ns = frame.timestamp_ns;
+  entry.attempts = frame.attempts;
+  entry.resent_packets = frame.resent_packets;
+  entry.gain = frame.gain;
+  entry.temperature_c = frame.temperature_c;
+  entry.largest = figures.largest;
+  entry.bright = figures.bright;
   WriteFrameFile(folder_ / entry.file, bytes, durable_);
-  journal_->Append(entry);
-  if (durable_) {
-    journal_->Flush();
-  }
-  ++picture_count_;
+  Commit(std::move(entry));
+}
+
+void SessionWriter::Skip(const std::string& reason) {
+  JournalEntry entry = NextEntry();
+  Expect(entry.picture.target == Target::kSample && !reason.empty(),
+         "a picture of the sample, and a reason");
+  entry.skipped = reason;
+  Commit(std::move(entry));
 }
 
 void SessionWriter::SetScanMap(const ScanMap& map) {
@@ -246,6 +312,15 @@ void SessionWriter::SetScanMap(const ScanMap& map) {
     return;
   }
   manifest_.scan_map = map;
+  WriteManifest(folder_, manifest_);
+}
+
+void SessionWriter::SetAdaptivePlan(const AdaptivePlan& plan) {
+  if (manifest_.adaptive_plan) {
+    Expect(*manifest_.adaptive_plan == plan, "one adaptive plan a session");
+    return;
+  }
+  manifest_.adaptive_plan = plan;
   WriteManifest(folder_, manifest_);
 }
 

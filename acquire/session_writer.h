@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace nacre::acquire {
 
@@ -53,8 +54,11 @@ class SessionWriter {
   const RigDescription& rig() const { return rig_; }
   const Schedule& schedule() const { return schedule_; }
 
-  /// Pictures that are there: the number of the next one.
-  std::int64_t picture_count() const { return picture_count_; }
+  /// Pictures that are there, or were skipped: the number of the next one.
+  std::int64_t picture_count() const { return std::ssize(entries_); }
+  const JournalEntry& Entry(std::int64_t number) const {
+    return entries_[static_cast<std::size_t>(number)];
+  }
   /// Pictures that Resume had to drop because their frames were damaged.
   std::int64_t dropped_count() const { return dropped_count_; }
 
@@ -62,8 +66,17 @@ class SessionWriter {
   /// what the camera said it would deliver.
   void Append(const Frame& frame);
 
+  /// Notes that the next picture, one of the sample, is left out, and why.
+  void Skip(const std::string& reason);
+
+  /// The points of a group that are lit: all but those that the adaptive plan leaves
+  /// out.
+  std::vector<GridIndex> LitPoints(int group) const;
+
   /// Notes the laser map in the manifest; it may be set once only.
   void SetScanMap(const ScanMap& map);
+  /// Likewise what the preview said.
+  void SetAdaptivePlan(const AdaptivePlan& plan);
 
   /// Returns once everything so far is on the disk itself.
   void Flush();
@@ -72,6 +85,8 @@ class SessionWriter {
   SessionWriter(const std::filesystem::path& folder,
                 const SessionManifest& manifest,
                 bool durable);
+  JournalEntry NextEntry() const;
+  void Commit(JournalEntry entry);
   void VerifyFrames(Journal& journal, const ProgressFunction& progress);
 
   std::filesystem::path folder_;
@@ -81,7 +96,7 @@ class SessionWriter {
   Schedule schedule_;
   bool durable_ = false;
   std::unique_ptr<JournalWriter> journal_;
-  std::int64_t picture_count_ = 0;
+  std::vector<JournalEntry> entries_;
   std::int64_t dropped_count_ = 0;
 };
 

@@ -22,18 +22,10 @@ void NoteLoss(ArvDevice*, gpointer lost) {
   *static_cast<std::atomic<bool>*>(lost) = true;
 }
 
-// Gives a buffer back to its stream.
-class LentBuffer {
- public:
-  LentBuffer(ArvStream* stream, ArvBuffer* buffer) : stream_(stream), buffer_(buffer) {}
-  ~LentBuffer() { arv_stream_push_buffer(stream_, buffer_); }
-  LentBuffer(const LentBuffer&) = delete;
-  LentBuffer& operator=(const LentBuffer&) = delete;
-
- private:
-  ArvStream* stream_;
-  ArvBuffer* buffer_;
-};
+// Cameras put it into chunks and files; the camera twin takes its noise from it.
+constexpr const char* kNumberFeature = "UserDefinedValue";
+constexpr const char* kTemperatureFeature = "DeviceTemperature";
+constexpr std::chrono::seconds kTemperaturePeriod{1};
 
 }  // namespace
 
@@ -56,6 +48,15 @@ AravisConnection::AravisConnection(const AravisOptions& options,
   TakeControl();
   ApplySettings(camera_.get(), options_);
   info_ = ReadInfo(camera_.get(), options_);
+  GErrorSlot error_of_extras;  // what a camera lacks is no error
+  takes_number_ = arv_camera_is_feature_available(
+      camera_.get(), kNumberFeature, error_of_extras.out());
+  has_temperature_ = arv_camera_is_feature_available(
+      camera_.get(), kTemperatureFeature, error_of_extras.out());
+  if (arv_camera_is_gain_available(camera_.get(), error_of_extras.out())) {
+    const double gain = arv_camera_get_gain(camera_.get(), error_of_extras.out());
+    gain_ = error_of_extras.failed() ? std::nullopt : std::optional(gain);
+  }
   OpenStream();
 }
 
@@ -64,6 +65,9 @@ AravisConnection::~AravisConnection() {
     // The camera goes idle by itself if this doesn't reach it.
     GErrorSlot ignored;
     arv_camera_stop_acquisition(camera_.get(), ignored.out());
+  }
+  if (lender_) {
+    lender_->Close();
   }
   stream_.reset();
   if (camera_) {
@@ -108,10 +112,11 @@ void AravisConnection::OpenStream() {
                  options_.socket_buffer_bytes,
                  nullptr);
   }
-  const guint payload_bytes = arv_camera_get_payload(camera_.get(), error.out());
+  payload_bytes_ = arv_camera_get_payload(camera_.get(), error.out());
   error.Check(options_.id, "read the size of its frames");
+  lender_ = std::make_shared<BufferReturn>(stream_.get());
   for (int k = 0; k < kBuffers; ++k) {
-    arv_stream_push_buffer(stream_.get(), arv_buffer_new(payload_bytes, nullptr));
+    arv_stream_push_buffer(stream_.get(), arv_buffer_new(payload_bytes_, nullptr));
   }
   arv_camera_start_acquisition(camera_.get(), error.out());
   error.Check(options_.id, "start acquisition");
@@ -140,10 +145,43 @@ double AravisConnection::SetExposureUs(double exposure_us) {
 
 void AravisConnection::DropLateFrames() {
   while (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_.get())) {
-    const LentBuffer lent(stream_.get(), buffer);
     ++statistics_.late;
     last_frame_id_ = arv_buffer_get_frame_id(buffer);
+    arv_stream_push_buffer(stream_.get(), buffer);
   }
+}
+
+// The frame's memory, given back to the stream once nobody needs it. The stream never
+// runs out of memory for the next ones.
+std::shared_ptr<ArvBuffer> AravisConnection::Lend(ArvBuffer* buffer) {
+  gint waiting = 0;
+  arv_stream_get_n_buffers(stream_.get(), &waiting, nullptr);
+  if (waiting < kBuffers - 1) {
+    arv_stream_push_buffer(stream_.get(), arv_buffer_new(payload_bytes_, nullptr));
+  }
+  return {buffer, [lender = lender_](ArvBuffer* lent) { lender->Take(lent); }};
+}
+
+void AravisConnection::TellNumber(std::uint64_t picture_number) {
+  if (!takes_number_ || told_number_ == picture_number) {
+    return;
+  }
+  GErrorSlot error;
+  arv_camera_set_integer(
+      camera_.get(), kNumberFeature, static_cast<gint64>(picture_number), error.out());
+  error.Check(options_.id, "tell it the picture's number");
+  told_number_ = picture_number;
+}
+
+void AravisConnection::ReadTemperature() {
+  if (!has_temperature_ || Clock::now() - temperature_at_ < kTemperaturePeriod) {
+    return;
+  }
+  GErrorSlot error;
+  const double temperature_c =
+      arv_camera_get_float(camera_.get(), kTemperatureFeature, error.out());
+  temperature_c_ = error.failed() ? std::nullopt : std::optional(temperature_c);
+  temperature_at_ = Clock::now();
 }
 
 // Makes the camera forget triggers that are still under way.
@@ -172,8 +210,10 @@ ArvBuffer* AravisConnection::WaitForBuffer(milliseconds timeout) {
   }
 }
 
-std::optional<Frame> AravisConnection::Capture(milliseconds timeout) {
+std::optional<PackedFrame> AravisConnection::Capture(std::uint64_t picture_number,
+                                                     milliseconds timeout) {
   DropLateFrames();
+  TellNumber(picture_number);
   if (options_.trigger == "Software") {
     GErrorSlot error;
     arv_camera_software_trigger(camera_.get(), error.out());
@@ -188,8 +228,7 @@ std::optional<Frame> AravisConnection::Capture(milliseconds timeout) {
     Restart();
     return std::nullopt;
   }
-  const LentBuffer lent(stream_.get(), buffer);
-  return Read(buffer);
+  return Read(Lend(buffer));
 }
 
 // GigE Vision counts in 16 bits and leaves zero out, or in 64 bits; USB3 in 64.
@@ -198,12 +237,12 @@ bool AravisConnection::IsDue(std::uint64_t frame_id) const {
          (*last_frame_id_ == 0xFFFF && frame_id == 1);
 }
 
-std::optional<Frame> AravisConnection::Read(ArvBuffer* buffer) {
-  const std::uint64_t frame_id = arv_buffer_get_frame_id(buffer);
+std::optional<PackedFrame> AravisConnection::Read(std::shared_ptr<ArvBuffer> buffer) {
+  const std::uint64_t frame_id = arv_buffer_get_frame_id(buffer.get());
   const bool due = IsDue(frame_id);
   last_frame_id_ = frame_id;
-  if (arv_buffer_get_status(buffer) != ARV_BUFFER_STATUS_SUCCESS ||
-      arv_buffer_get_payload_type(buffer) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE) {
+  if (arv_buffer_get_status(buffer.get()) != ARV_BUFFER_STATUS_SUCCESS ||
+      arv_buffer_get_payload_type(buffer.get()) != ARV_BUFFER_PAYLOAD_TYPE_IMAGE) {
     ++statistics_.incomplete;
     return std::nullopt;
   }
@@ -214,15 +253,17 @@ std::optional<Frame> AravisConnection::Read(ArvBuffer* buffer) {
   }
   std::size_t size = 0;
   const auto* bytes =
-      static_cast<const std::uint8_t*>(arv_buffer_get_image_data(buffer, &size));
-  Frame frame;
-  frame.width = arv_buffer_get_image_width(buffer);
-  frame.height = arv_buffer_get_image_height(buffer);
-  const auto pixels =
-      static_cast<std::size_t>(info_.width) * static_cast<std::size_t>(info_.height);
+      static_cast<const std::uint8_t*>(arv_buffer_get_image_data(buffer.get(), &size));
+  PackedFrame packed;
+  Frame& frame = packed.frame;
+  frame.width = arv_buffer_get_image_width(buffer.get());
+  frame.height = arv_buffer_get_image_height(buffer.get());
+  const std::size_t count = static_cast<std::size_t>(info_.width) *
+                            static_cast<std::size_t>(info_.height) *
+                            static_cast<std::size_t>(format_.SamplesPerPixel());
+  const ArvPixelFormat code = arv_buffer_get_image_pixel_format(buffer.get());
   if (frame.width != info_.width || frame.height != info_.height ||
-      arv_buffer_get_image_pixel_format(buffer) != format_.code ||
-      size < format_.ByteCount(pixels)) {
+      code != format_.code || size < format_.ByteCount(count)) {
     throw DeviceError(
         fmt::format("camera {}: its frame is {} x {} pixels of format {:#x} in {} "
                     "bytes, not {} x {} "
@@ -230,18 +271,27 @@ std::optional<Frame> AravisConnection::Read(ArvBuffer* buffer) {
                     options_.id,
                     frame.width,
                     frame.height,
-                    arv_buffer_get_image_pixel_format(buffer),
+                    code,
                     size,
                     info_.width,
                     info_.height,
                     format_.name));
   }
-  frame.counts.resize(pixels);
-  Unpack(format_, {bytes, size}, frame.counts);
   frame.frame_id = frame_id;
-  frame.timestamp_ns = static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer));
+  frame.timestamp_ns =
+      static_cast<std::int64_t>(arv_buffer_get_timestamp(buffer.get()));
+  frame.gain = gain_;
+  ReadTemperature();
+  frame.temperature_c = temperature_c_;
+  const std::uint64_t resent = StreamCount("n_resent_packets");
+  frame.resent_packets = resent - resent_packets_;
+  resent_packets_ = resent;
+  packed.unpack = [buffer, bytes, size, count, &format = format_](Frame& unpacked) {
+    unpacked.counts.resize(count);
+    Unpack(format, {bytes, size}, unpacked.counts);
+  };
   ++statistics_.frames;
-  return frame;
+  return packed;
 }
 
 std::uint64_t AravisConnection::StreamCount(const char* name) const {

@@ -20,7 +20,7 @@ std::string Names(const NameLister& list) {
 }
 
 void SetPixelFormat(ArvCamera* camera, const AravisOptions& options) {
-  const MonoFormat& format = WantedFormat(options);
+  const PixelFormat& format = WantedFormat(options);
   GErrorSlot error;
   arv_camera_set_pixel_format_from_string(camera, format.name.c_str(), error.out());
   const ArvPixelFormat set =
@@ -33,7 +33,7 @@ void SetPixelFormat(ArvCamera* camera, const AravisOptions& options) {
         Names([&](guint* count, GError** out) {
           return arv_camera_dup_available_pixel_formats_as_strings(camera, count, out);
         }),
-        MonoFormatNames()));
+        PixelFormatNames()));
   }
 }
 
@@ -161,15 +161,15 @@ void SetPacketSize(ArvCamera* camera, const AravisOptions& options) {
 
 }  // namespace
 
-const MonoFormat& WantedFormat(const AravisOptions& options) {
-  const MonoFormat* format = FindMonoFormat(options.pixel_format);
+const PixelFormat& WantedFormat(const AravisOptions& options) {
+  const PixelFormat* format = FindPixelFormat(options.pixel_format);
   if (format == nullptr) {
     throw DeviceError(
         fmt::format("camera {}: '{}' isn't a pixel format that Nacre "
                     "reads; these are: {}",
                     options.id,
                     options.pixel_format,
-                    MonoFormatNames()));
+                    PixelFormatNames()));
   }
   return *format;
 }
@@ -209,6 +209,7 @@ CameraInfo ReadInfo(ArvCamera* camera, const AravisOptions& options) {
   info.width = region.width;
   info.height = region.height;
   info.bit_depth = WantedFormat(options).bit_depth;
+  info.mosaic = WantedFormat(options).mosaic;
   arv_camera_get_exposure_time_bounds(
       camera, &info.min_exposure_us, &info.max_exposure_us, error.out());
   error.Check(options.id, "read the range of its exposure");

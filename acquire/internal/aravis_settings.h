@@ -3,7 +3,7 @@
 #include "acquire/aravis_options.h"
 #include "acquire/camera.h"
 #include "acquire/internal/aravis_handles.h"
-#include "acquire/mono_format.h"
+#include "acquire/pixel_format.h"
 
 #include <string>
 
@@ -15,7 +15,7 @@ namespace nacre::acquire::internal {
 void ApplySettings(ArvCamera* camera, const AravisOptions& options);
 
 /// The format that the options ask for; DeviceError if it isn't a monochrome one.
-const MonoFormat& WantedFormat(const AravisOptions& options);
+const PixelFormat& WantedFormat(const AravisOptions& options);
 
 /// As set now.
 CameraInfo ReadInfo(ArvCamera* camera, const AravisOptions& options);

@@ -6,6 +6,7 @@
 #include <array>
 #include <fmt/format.h>
 #include <libusb.h>
+#include <utility>
 
 namespace nacre::acquire::internal {
 namespace {
@@ -87,12 +88,18 @@ void HeliosUsb::Close::operator()(libusb_device_handle* handle) const {
 std::vector<UsbPlace> FindHeliosPlaces() {
   libusb_context* const context = NewContext();
   std::vector<UsbPlace> places;
-  for (libusb_device* device : DeviceList(context).Devices()) {
-    if (IsHelios(device)) {
-      places.push_back(Place(device));
+  {
+    const DeviceList list(context);
+    for (libusb_device* device : list.Devices()) {
+      if (IsHelios(device)) {
+        places.push_back(Place(device));
+      }
     }
   }
   libusb_exit(context);
+  std::sort(places.begin(), places.end(), [](const UsbPlace& a, const UsbPlace& b) {
+    return std::pair(a.bus, a.address) < std::pair(b.bus, b.address);
+  });
   return places;
 }
 
@@ -256,6 +263,7 @@ void HeliosUsb::Checked(int result, const std::string& doing) {
   if (result >= 0) {
     return;
   }
+  gone_ = gone_ || result == LIBUSB_ERROR_NO_DEVICE;
   if (result == LIBUSB_ERROR_PIPE && handle_) {  // a halted endpoint stays so
     libusb_clear_halt(handle_.get(), kFrameOut);
     libusb_clear_halt(handle_.get(), kCommandOut);

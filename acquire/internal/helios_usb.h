@@ -32,6 +32,8 @@ class HeliosUsb {
   HeliosUsb& operator=(const HeliosUsb&) = delete;
 
   UsbPlace place() const { return place_; }
+  /// Whether a call found it unplugged.
+  bool IsGone() const { return gone_; }
 
   /// Takes the interface and its alternate setting 1, for this program alone. False if
   /// another has it.
@@ -65,6 +67,7 @@ class HeliosUsb {
   std::unique_ptr<libusb_context, Close> context_;
   std::unique_ptr<libusb_device_handle, Close> handle_;
   bool claimed_ = false;
+  bool gone_ = false;
 };
 
 }  // namespace nacre::acquire::internal

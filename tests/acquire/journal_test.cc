@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/hash.h"
 #include "tests/support/temp_folder.h"
 
 #include <gmock/gmock.h>
@@ -45,6 +46,49 @@ TEST(Journal, RoundTripKeepsEverything) {
   EXPECT_EQ(entry.exposure_us, 1000.25);
   EXPECT_EQ(entry.frame_id, 1234567890123456789ULL);
   EXPECT_EQ(entry.timestamp_ns, -5);
+}
+
+TEST(Journal, RecordsWhatTheCameraTold) {
+  JournalEntry entry = EntryOf(0);
+  entry.attempts = 3;
+  entry.resent_packets = 12;
+  entry.gain = 1.5;
+  entry.temperature_c = 40.25;
+  entry.largest = 4095;
+  entry.bright = 77;
+  const JournalEntry back = ParseJournal(FormatJournalLine(entry), "j").entries.at(0);
+  EXPECT_TRUE(back.taken());
+  EXPECT_EQ(back.attempts, 3);
+  EXPECT_EQ(back.resent_packets, 12U);
+  EXPECT_EQ(back.gain, 1.5);
+  EXPECT_EQ(back.temperature_c, 40.25);
+  EXPECT_EQ(back.largest, 4095);
+  EXPECT_EQ(back.bright, 77);
+  EXPECT_FALSE(ParseJournal(FormatJournalLine(EntryOf(0)), "j").entries.at(0).gain);
+}
+
+TEST(Journal, ASkippedPictureHasAReasonAndNoFile) {
+  JournalEntry entry = EntryOf(0);
+  entry.skipped = "nothing to see";
+  const std::string line = FormatJournalLine(entry);
+  EXPECT_EQ(line.find("\"file\""), std::string::npos);
+  const JournalEntry back = ParseJournal(line, "j").entries.at(0);
+  EXPECT_FALSE(back.taken());
+  EXPECT_EQ(back.skipped, "nothing to see");
+  EXPECT_EQ(back.spots, entry.spots);
+}
+
+// As version 0.1 wrote them, before `attempts`.
+TEST(Journal, ReadsOlderLines) {
+  const std::string text =
+      R"({"number":0,"target":"flat","pose":0,"channel":-1,"group":-1,"repeat":1,)"
+      R"("spots":[],"exposure_us":500.0,"applied_exposure_us":500.0,)"
+      R"("file":"frames/000000.pgm","xxh3":"00","frame_id":1,"timestamp_ns":2})";
+  const std::string line = text + '\t' + HashHex(text.data(), text.size()) + '\n';
+  const Journal journal = ParseJournal(line, "j");
+  ASSERT_EQ(journal.entries.size(), 1U);
+  EXPECT_EQ(journal.entries[0].attempts, 1);
+  EXPECT_EQ(journal.line_ends, (std::vector<std::uint64_t>{line.size()}));
 }
 
 TEST(Journal, EmptyIsFine) {

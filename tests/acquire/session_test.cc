@@ -60,6 +60,21 @@ TEST(FrameFile, RoundTripAndKnownBytes) {
   EXPECT_EQ(frame.counts, SmallFrame().counts);
 }
 
+TEST(FrameFile, EightBitsAndColoursRoundTrip) {
+  const Frame grey{.width = 3, .height = 1, .counts = {0, 128, 255}};
+  EXPECT_EQ(EncodeFrame(grey, 8), std::string("P5\n3 1\n255\n\0\x80\xFF", 14));
+  EXPECT_EQ(DecodeFrame(EncodeFrame(grey, 8), "f").counts, grey.counts);
+  const Frame color{.width = 2, .height = 1, .counts = {1, 2, 3, 4, 5, 6}};
+  EXPECT_EQ(EncodeFrame(color, 8), "P6\n2 1\n255\n\1\2\3\4\5\6");
+  for (const int depth : {8, 12}) {
+    const std::string bytes = EncodeFrame(color, depth);
+    EXPECT_EQ(DecodeFrame(bytes, "f").counts, color.counts);
+    for (std::size_t length = 0; length < bytes.size(); ++length) {
+      EXPECT_THROW(DecodeFrame(bytes.substr(0, length), "f"), Error) << length;
+    }
+  }
+}
+
 TEST(FrameFile, AnyTruncationIsBadData) {
   const std::string bytes = EncodeFrame(SmallFrame(), 12);
   for (std::size_t length = 0; length < bytes.size(); ++length) {

@@ -8,9 +8,9 @@
 
 namespace nacre::acquire {
 
-/// How a camera lays out a monochrome picture in memory: a pixel format of the GenICam
-/// Pixel Format Naming Convention.
-struct MonoFormat {
+/// How a camera lays out a picture in memory: a pixel format of the GenICam Pixel
+/// Format Naming Convention.
+struct PixelFormat {
   enum class Packing {
     kByte,        ///< one byte a count
     kWord,        ///< two, little endian; the count is at the low end
@@ -21,22 +21,27 @@ struct MonoFormat {
   std::uint32_t code = 0;  ///< in the leader of a frame
   int bit_depth = 0;
   Packing packing = Packing::kWord;
+  /// Colours of the pixels: "" monochrome; "RGGB", "GRBG", "GBRG", "BGGR" the upper
+  /// left two rows of two of a mosaic; "RGB" each pixel has all three, in this order.
+  std::string mosaic;
 
-  /// Of a picture of so many pixels.
-  std::size_t ByteCount(std::size_t pixels) const;
+  int SamplesPerPixel() const { return mosaic == "RGB" ? 3 : 1; }
+  /// Of so many counts.
+  std::size_t ByteCount(std::size_t counts) const;
 };
 
-/// Mono8, Mono10, Mono12, Mono12p, Mono12Packed, Mono14, Mono16.
-const std::vector<MonoFormat>& MonoFormats();
+/// Mono8, 10, 12, 12p, 12Packed, 14, 16; Bayer{RG,GR,GB,BG}8, 10, 12, 12p, 12Packed,
+/// 16; RGB8.
+const std::vector<PixelFormat>& PixelFormats();
 
 /// Their names, separated by commas, for messages.
-std::string MonoFormatNames();
+std::string PixelFormatNames();
 
 /// Null if there is none of this name.
-const MonoFormat* FindMonoFormat(const std::string& name);
+const PixelFormat* FindPixelFormat(const std::string& name);
 
 /// The counts in `bytes`, which must hold as many as there are in `counts`.
-void Unpack(const MonoFormat& format,
+void Unpack(const PixelFormat& format,
             std::span<const std::uint8_t> bytes,
             std::span<std::uint16_t> counts);
 
