@@ -30,7 +30,7 @@ class Illuminator {
 
   /// Lights these spots with one channel until Blank() or the next call; returns when
   /// they are lit. The mean power of a spot is the same however many there are; their
-  /// order doesn't matter. Throws DeviceError outside ± max_angle_rad or if the device
+  /// order, which is that of their visits, changes no picture. Throws DeviceError outside ± max_angle_rad or if the device
   /// is gone and doesn't come back.
   virtual void Light(std::span<const ScanAngle> spots, int channel) = 0;
 

@@ -36,6 +36,8 @@ class SpawnSettings {
   explicit SpawnSettings(int socket) {
     posix_spawn_file_actions_init(&actions_);
     posix_spawn_file_actions_adddup2(&actions_, socket, STDIN_FILENO);
+    // Whatever it inherited of the device would keep that from being free.
+    posix_spawn_file_actions_addclosefrom_np(&actions_, STDERR_FILENO + 1);
     posix_spawnattr_init(&attributes_);
     sigset_t none;
     sigemptyset(&none);
@@ -189,6 +191,9 @@ int RunLaserWatchdog(int usb_bus, int usb_address, pid_t parent) {
         return 0;
       }
     } catch (const Error& e) {  // tried again: it is the last line of defence
+      if (dac.IsGone()) {
+        return 0;  // without power there is no light
+      }
       last = e.what();
     }
     std::this_thread::sleep_for(kPause);

@@ -67,19 +67,20 @@ std::vector<std::size_t> SpreadOrder(std::size_t n) {
 }
 
 struct Place {
-  std::uint16_t y = 0;
   std::uint16_t x = 0;
-  auto operator<=>(const Place&) const = default;
+  std::uint16_t y = 0;
+  friend bool operator==(const Place&, const Place&) = default;
 };
 
 std::vector<Place> Places(const ScanField& field, std::span<const ScanAngle> spots) {
   std::vector<Place> places;
   for (const ScanAngle& spot : spots) {
-    places.push_back({static_cast<std::uint16_t>(field.StepFromAngle(spot.y_rad)),
-                      static_cast<std::uint16_t>(field.StepFromAngle(spot.x_rad))});
+    const Place place{static_cast<std::uint16_t>(field.StepFromAngle(spot.x_rad)),
+                      static_cast<std::uint16_t>(field.StepFromAngle(spot.y_rad))};
+    if (std::find(places.begin(), places.end(), place) == places.end()) {
+      places.push_back(place);
+    }
   }
-  std::sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
   return places;
 }
 

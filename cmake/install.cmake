@@ -20,6 +20,12 @@ if(TARGET nacre)
   install(TARGETS nacre RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(DIRECTORY cli/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
 endif()
+if(TARGET nacre-laser-watchdog)
+  install(TARGETS nacre-laser-watchdog
+    RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/nacre)
+  install(FILES acquire/99-nacre-helios.rules
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
+endif()
 if(NACRE_WITH_RIGS)
   install(DIRECTORY rigs/ DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre/rigs
     FILES_MATCHING PATTERN "*.toml")

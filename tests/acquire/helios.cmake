@@ -1,0 +1,8 @@
+if(TARGET nacre_usb_twins)
+  nacre_test(helios
+    SOURCES
+      helios_dac_test.cc
+    LIBRARIES
+      nacre::helios nacre::usb_twins
+    EMULATED_USB)
+endif()
