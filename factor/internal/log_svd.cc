@@ -79,7 +79,11 @@ class GramPass {
     ParallelFor(block.count, options_.thread_count, [&](std::int64_t row) {
       const auto r = static_cast<std::size_t>(row);
       RowMatrix& y = rows[ClusterOf(block, row)];
-      missing[r] = TransformOne(block, row, channel, &y(place[r], 0));
+      missing[r] = CompleteRow(model_,
+                               block,
+                               row,
+                               channel,
+                               {&y(place[r], 0), static_cast<std::size_t>(window_)});
     });
     for (const int n : missing) {
       missing_[channel] = std::max(missing_[channel], n);
@@ -88,35 +92,6 @@ class GramPass {
 
   std::size_t ClusterOf(const SliceBlock& block, std::int64_t row) const {
     return model_.cluster[static_cast<std::size_t>(block.first + row)];
-  }
-
-  int TransformOne(const SliceBlock& block,
-                   std::int64_t row,
-                   std::size_t channel,
-                   double* values) const {
-    const auto window = static_cast<std::size_t>(window_);
-    const auto offset =
-        static_cast<std::size_t>(row * source_.header().SliceSize()) + channel * window;
-    const std::span<const std::uint8_t> valid(block.valid + offset, window);
-    const std::span<double> y(values, window);
-    const RowTransform& transform = model_.transforms[channel];
-    const ChannelScan& scan = model_.scans[channel];
-    const int missing =
-        TransformRow({block.rd + offset, window}, valid, scan, transform, y);
-    if (missing > 0 && !model_.bases.empty()) {
-      const RowBasis& basis = model_.Basis(channel, block.first + row);
-      const Eigen::VectorXd predicted =
-          basis.vectors * basis.PartialCoordinates(y, valid);
-      // Predictions stay within what was measured anywhere in the channel.
-      const double low = transform.Forward(std::min(0.0, scan.least));
-      const double high = transform.Forward(std::max(0.0, scan.peak));
-      for (std::size_t cell = 0; cell < window; ++cell) {
-        if (valid[cell] == 0) {
-          y[cell] = std::clamp(predicted(static_cast<Eigen::Index>(cell)), low, high);
-        }
-      }
-    }
-    return missing;
   }
 
   SliceSource& source_;
@@ -129,10 +104,40 @@ class GramPass {
 
 }  // namespace
 
-void FitSvd(SliceSource& source,
-            const SvdFitOptions& options,
-            SvdModel& model,
-            const ProgressFunction& progress) {
+int CompleteRow(const SvdModel& model,
+                const SliceBlock& block,
+                std::int64_t row,
+                std::size_t channel,
+                std::span<double> values) {
+  const std::size_t window = values.size();
+  const auto offset =
+      (static_cast<std::size_t>(row) * model.scans.size() + channel) * window;
+  const std::span<const std::uint8_t> valid(block.valid + offset, window);
+  const RowTransform& transform = model.transforms[channel];
+  const ChannelScan& scan = model.scans[channel];
+  const int missing =
+      TransformRow({block.rd + offset, window}, valid, scan, transform, values);
+  if (missing == 0 || model.bases.empty()) {
+    return missing;
+  }
+  const RowBasis& basis = model.Basis(channel, block.first + row);
+  const Eigen::VectorXd predicted =
+      basis.vectors * basis.PartialCoordinates(values, valid);
+  // Predictions stay within what was measured anywhere in the channel.
+  const double low = transform.Forward(std::min(0.0, scan.least));
+  const double high = transform.Forward(std::max(0.0, scan.peak));
+  for (std::size_t cell = 0; cell < window; ++cell) {
+    if (valid[cell] == 0) {
+      values[cell] = std::clamp(predicted(static_cast<Eigen::Index>(cell)), low, high);
+    }
+  }
+  return missing;
+}
+
+void FitByGram(SliceSource& source,
+               const SvdFitOptions& options,
+               SvdModel& model,
+               const ProgressFunction& progress) {
   for (int round = 0; round <= options.fill_rounds; ++round) {
     GramPass pass(source, options, model);
     const bool has_missing = pass.Run(progress, round == 0 ? "sums" : "missing values");

@@ -17,6 +17,8 @@ struct SvdFitOptions {
   int terms = 10;
   int cluster_count = 1;
   int fill_rounds = 2;  ///< times that missing values are predicted and fitted again
+  double tolerance = 1e-5;  ///< on the excess error, where found by iteration
+  std::uint64_t seed = 1;   ///< of the rows that the iteration starts on
   int thread_count = 0;
 };
 
@@ -28,7 +30,12 @@ struct SvdModel {
   std::vector<ChannelScan> scans;        ///< [channel]
   std::vector<std::uint8_t> cluster;     ///< [point]
   int cluster_count = 1;
+  /// [channel][point][rank]: the rows' coordinates, where the fit leaves them; else
+  /// empty, and they take a projection.
+  std::vector<std::vector<float>> scores;
   int passes = 0;  ///< times that all slices were read
+  double excess =
+      0;  ///< estimated, over the error of the exact truncated SVD, relative
 
   const RowBasis& Basis(std::size_t channel, std::int64_t point) const {
     return bases[channel * static_cast<std::size_t>(cluster_count) +
@@ -36,19 +43,41 @@ struct SvdModel {
   }
 };
 
-/// Truncated SVD of every channel's (and cluster's) matrix of transformed rows, in one
-/// pass over the slices, plus `fill_rounds` more if values are missing. The singular
-/// vectors are the eigenvectors of YᵀY, core² × core², which is all that is kept of the
-/// pass: 8 core⁴ bytes a channel and cluster.
+/// Truncated SVD of every channel's (and cluster's) matrix of transformed rows. Large
+/// matrices without clusters take FitByBlocks, others FitByGram.
 ///
-/// `model` comes with everything but `bases` and `passes`.
+/// `model` comes with everything but `bases`, `scores`, `passes` and `excess`.
 void FitSvd(SliceSource& source,
             const SvdFitOptions& options,
             SvdModel& model,
             const ProgressFunction& progress);
 
-/// The transformed row, missing values filled: from the mean slice, or, given a basis,
-/// by the model's own prediction. Returns the number of missing values.
+/// By the eigenvectors of YᵀY, core² × core², which is all that is kept of one pass
+/// over the slices: 8 core⁴ bytes a channel and cluster. `fill_rounds` passes more if
+/// values are missing.
+void FitByGram(SliceSource& source,
+               const SvdFitOptions& options,
+               SvdModel& model,
+               const ProgressFunction& progress);
+
+/// By block iteration (block_svd.h), on a sample of slices first and then on all: as
+/// many passes as `tolerance` and, if values are missing, `fill_rounds` take. Without
+/// clusters only.
+void FitByBlocks(SliceSource& source,
+                 const SvdFitOptions& options,
+                 SvdModel& model,
+                 const ProgressFunction& progress);
+
+/// The transformed row, missing values filled: from the mean slice, or, where the model
+/// has bases, by its own prediction. Returns the number of missing values.
+int CompleteRow(const SvdModel& model,
+                const SliceBlock& block,
+                std::int64_t row,
+                std::size_t channel,
+                std::span<double> values);
+
+/// The transformed row, missing values filled from the mean slice. Returns their
+/// number.
 int TransformRow(std::span<const float> rd,
                  std::span<const std::uint8_t> valid,
                  const ChannelScan& scan,

@@ -6,11 +6,39 @@
 #include "reconstruct/error_figures.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace nacre::factor::internal {
 
+namespace {
+
+// The fit's own coordinates, without another pass.
+void StoreScores(const SvdModel& model, Material& m) {
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  for (std::size_t c = 0; c < model.scores.size(); ++c) {
+    const RowBasis& basis = model.bases[c];
+    const auto rank = static_cast<std::size_t>(basis.rank());
+    const auto terms = static_cast<std::size_t>(m.terms);
+    for (std::size_t j = 0; j < std::min(terms, rank); ++j) {
+      const double scale = std::sqrt(static_cast<double>(basis.rows)) /
+                           basis.sigma(static_cast<Eigen::Index>(j));
+      float* map = &m.f[(c * terms + j) * points];
+      for (std::size_t point = 0; point < points; ++point) {
+        map[point] = static_cast<float>(
+            static_cast<double>(model.scores[c][point * rank + j]) * scale);
+      }
+    }
+  }
+}
+
+}  // namespace
+
 Material Project(Job& job, const SvdModel& model, int terms) {
   Material material = ToMaterial(model, job.source.header(), terms);
+  if (!model.scores.empty()) {
+    StoreScores(model, material);
+    return material;
+  }
   const std::int64_t points = material.PointCount();
   for (std::int64_t first = 0; first < points; first += kBlockRows) {
     Report(job.progress, {"factor", first, points, "projection"});
@@ -28,6 +56,7 @@ Material Project(Job& job, const SvdModel& model, int terms) {
 
 std::vector<TermsError> ErrorCurve(const Job& job, const SvdModel& model, int terms) {
   SvdModel sampled = model;
+  sampled.scores.clear();
   sampled.cluster.clear();
   for (const std::int64_t row : job.sample.rows) {
     sampled.cluster.push_back(model.cluster[static_cast<std::size_t>(row)]);

@@ -7,7 +7,8 @@
 
 namespace nacre::factor::internal {
 
-/// A pass over all slices: their coordinates in the model's bases become factor maps.
+/// The slices' coordinates in the model's bases become factor maps: a pass over all
+/// slices, if the fit hasn't left them.
 Material Project(Job& job, const SvdModel& model, int terms);
 
 /// What 1, 2, …, `terms` terms give on the sample.

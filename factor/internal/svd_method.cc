@@ -50,6 +50,7 @@ class SvdMethod final : public Method {
            {.terms = job.options.terms,
             .cluster_count = model_.cluster_count,
             .fill_rounds = job.options.fill_rounds,
+            .seed = job.options.seed,
             .thread_count = job.options.thread_count},
            model_,
            job.progress);

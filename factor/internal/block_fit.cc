@@ -1,0 +1,108 @@
+// Truncated SVDs of a dataset's channels by block iteration.
+
+#include "factor/internal/block_svd.h"
+#include "factor/internal/log_svd.h"
+#include "factor/internal/method.h"
+#include "factor/internal/row_kernels.h"
+
+#include <algorithm>
+#include <cstring>
+
+namespace nacre::factor::internal {
+namespace {
+
+// The sample must be a small part for its passes to cost little.
+constexpr std::int64_t kLeastRows = 2 * kSvdSampleRows;
+
+bool BlocksPay(const reconstruct::RdHeader& header,
+               const SvdFitOptions& options,
+               const SvdModel& model) {
+  return options.cluster_count == 1 && header.PointCount() >= kLeastRows &&
+         4 * PaddedColumns(options.terms) <= header.WindowSize() &&
+         std::all_of(model.transforms.begin(), model.transforms.end(), FitsFloats);
+}
+
+bool HasMissing(const SvdModel& model, const reconstruct::RdHeader& header) {
+  return std::any_of(
+      model.scans.begin(), model.scans.end(), [&](const ChannelScan& scan) {
+        return scan.used < header.PointCount() * header.WindowSize();
+      });
+}
+
+RowBasis ToBasis(const BlockSvd& svd, const reconstruct::RdHeader& header) {
+  RowBasis basis;
+  basis.rows = header.PointCount();
+  basis.vectors = svd.vectors;
+  basis.sigma = svd.sigma;
+  basis.mean = svd.mean;
+  const auto n = static_cast<double>(basis.rows);
+  basis.variance = (svd.sigma.cwiseAbs2() / n - svd.mean.cwiseAbs2()).cwiseMax(0);
+  basis.residual_variance = std::max(0.0, svd.squares - svd.sigma.squaredNorm()) /
+                            (n * static_cast<double>(header.WindowSize()));
+  return basis;
+}
+
+}  // namespace
+
+void FitByBlocks(SliceSource& source,
+                 const SvdFitOptions& options,
+                 SvdModel& model,
+                 const ProgressFunction& progress) {
+  const reconstruct::RdHeader& header = source.header();
+  const auto window = static_cast<std::size_t>(header.WindowSize());
+  const std::size_t channel_count = model.scans.size();
+  const bool has_missing = HasMissing(model, header);
+
+  const auto fill = [&](const SliceBlock& block,
+                        std::int64_t row,
+                        std::size_t channel,
+                        float* y) {
+    const auto offset =
+        (static_cast<std::size_t>(row) * channel_count + channel) * window;
+    if (!has_missing || std::memchr(block.valid + offset, 0, window) == nullptr) {
+      return TransformFloats(model.transforms[channel], {block.rd + offset, window}, y);
+    }
+    std::vector<double> values(window);
+    CompleteRow(model, block, row, channel, values);
+    return CopyRow(values, y);
+  };
+  std::vector<std::size_t> channels(channel_count);
+  for (std::size_t c = 0; c < channel_count; ++c) {
+    channels[c] = c;
+  }
+  BlockSvdSolver solver(fill,
+                        channels,
+                        {.terms = options.terms,
+                         .tolerance = options.tolerance,
+                         .least_passes = has_missing ? 1 + options.fill_rounds : 1,
+                         .thread_count = options.thread_count});
+  std::vector<RowBasis> bases(channel_count);
+  solver.OnBasis([&](std::size_t channel, const BlockSvd& svd) {
+    bases[channel] = ToBasis(svd, header);
+    if (channel + 1 == channel_count) {
+      model.bases = bases;
+    }
+  });
+  const Sample sample = TakeSample(source, kSvdSampleRows, options.seed);
+  BlockSvds found = solver.Solve(*SourceOf(sample.dataset), source, progress);
+  model.passes += found.passes;
+  for (BlockSvd& svd : found.svds) {
+    model.excess = std::max(model.excess, svd.excess);
+    if (!has_missing) {  // else they belong to the values filled before
+      model.scores.push_back(std::move(svd.scores));
+    }
+  }
+}
+
+void FitSvd(SliceSource& source,
+            const SvdFitOptions& options,
+            SvdModel& model,
+            const ProgressFunction& progress) {
+  if (BlocksPay(source.header(), options, model)) {
+    FitByBlocks(source, options, model, progress);
+  } else {
+    FitByGram(source, options, model, progress);
+  }
+}
+
+}  // namespace nacre::factor::internal
