@@ -131,13 +131,17 @@ CapturePlan PlanCapture(const RigDescription& rig, const CameraInfo& camera) {
   plan.target_pictures = schedule.grid_begin();
   plan.grid_pictures = schedule.size() - schedule.grid_begin();
   plan.spot_groups = schedule.group_count();
+  for (int group = 0; group < schedule.group_count(); ++group) {
+    plan.grid_points += std::ssize(schedule.Group(group));
+  }
   for (std::int64_t number = 0; number < schedule.size(); ++number) {
     plan.exposure_seconds += schedule[number].exposure_us * 1e-6;
   }
   constexpr std::uint64_t kHeaderAndLine = 400;
   plan.disk_bytes = static_cast<std::uint64_t>(schedule.size()) *
                     (static_cast<std::uint64_t>(camera.width) *
-                         static_cast<std::uint64_t>(camera.height) * 2 +
+                         static_cast<std::uint64_t>(camera.height) * 2 *
+                         static_cast<std::uint64_t>(camera.SamplesPerPixel()) +
                      kHeaderAndLine);
   return plan;
 }

@@ -69,6 +69,7 @@ CaptureSummary CaptureGrid(SessionWriter& session,
 struct CapturePlan {
   std::int64_t target_pictures = 0;
   std::int64_t grid_pictures = 0;
+  std::int64_t grid_points = 0;
   int spot_groups = 0;
   double exposure_seconds = 0;  ///< all exposures, one after the other
   std::uint64_t disk_bytes = 0;

@@ -3,6 +3,7 @@
 #include "core/error.h"
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <charconv>
 #include <fcntl.h>
@@ -37,40 +38,53 @@ std::string FrameFileName(std::int64_t number) {
 
 namespace {
 
-// Big endian, as PGM wants it; plain enough to become a byte shuffle.
+// A header's length leaves the counts after it at any address.
+using Word [[gnu::aligned(1), gnu::may_alias]] = std::uint16_t;
+
+// Big endian, as PGM wants it.
 __attribute__((target_clones("avx2", "default"))) void PutWords(
-    const std::uint16_t* counts, std::size_t count, unsigned char* bytes) {
-  for (std::size_t k = 0; k < count; ++k) {
-    bytes[2 * k] = static_cast<unsigned char>(counts[k] >> 8);
-    bytes[2 * k + 1] = static_cast<unsigned char>(counts[k] & 0xFF);
+    const std::uint16_t* counts, std::size_t count, char* bytes) {
+  auto* words = reinterpret_cast<Word*>(bytes);
+  if constexpr (std::endian::native == std::endian::little) {
+    for (std::size_t k = 0; k < count; ++k) {
+      words[k] = static_cast<std::uint16_t>(counts[k] >> 8 | counts[k] << 8);
+    }
+  } else {
+    for (std::size_t k = 0; k < count; ++k) {
+      words[k] = counts[k];
+    }
   }
 }
 
 }  // namespace
 
 std::string EncodeFrame(const Frame& frame, int bit_depth) {
+  std::string bytes;
+  EncodeFrame(frame, bit_depth, bytes);
+  return bytes;
+}
+
+void EncodeFrame(const Frame& frame, int bit_depth, std::string& bytes) {
   const std::size_t pixels =
       static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
   const bool is_color = frame.counts.size() == 3 * pixels && pixels > 0;
   Expect(is_color || frame.counts.size() == pixels, "a count or three a pixel");
   Expect(bit_depth >= 8 && bit_depth <= 16, "one or two bytes a count");
-  std::string bytes = fmt::format("{}\n{} {}\n{}\n",
-                                  is_color ? "P6" : "P5",
-                                  frame.width,
-                                  frame.height,
-                                  (1 << bit_depth) - 1);
-  const std::size_t header = bytes.size();
+  const std::string header = fmt::format("{}\n{} {}\n{}\n",
+                                         is_color ? "P6" : "P5",
+                                         frame.width,
+                                         frame.height,
+                                         (1 << bit_depth) - 1);
   const std::size_t bytes_a_count = bit_depth > 8 ? 2 : 1;
-  bytes.resize(header + bytes_a_count * frame.counts.size());
-  auto* out = reinterpret_cast<unsigned char*>(bytes.data() + header);
+  bytes.resize(header.size() + bytes_a_count * frame.counts.size());
+  char* out = std::copy(header.begin(), header.end(), bytes.data());
   if (bytes_a_count == 2) {
     PutWords(frame.counts.data(), frame.counts.size(), out);
   } else {
     for (std::size_t k = 0; k < frame.counts.size(); ++k) {
-      out[k] = static_cast<unsigned char>(frame.counts[k]);
+      out[k] = static_cast<char>(frame.counts[k]);
     }
   }
-  return bytes;
 }
 
 Frame DecodeFrame(std::string_view bytes, const std::string& origin) {

@@ -16,6 +16,8 @@ std::string FrameFileName(std::int64_t number);
 /// 2^bit_depth − 1, two bytes a count above 8 bits: no loss, no compression, read by
 /// every picture program. A mosaic is written as it is.
 std::string EncodeFrame(const Frame& frame, int bit_depth);
+/// The same into memory that is there already.
+void EncodeFrame(const Frame& frame, int bit_depth, std::string& bytes);
 
 /// The inverse: width, height and counts, three times as many from a PPM. Throws
 /// BadData naming `origin` for anything that EncodeFrame wouldn't write.

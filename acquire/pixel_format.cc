@@ -2,6 +2,9 @@
 
 #include "core/error.h"
 
+#include <bit>
+#include <cstring>
+
 namespace nacre::acquire {
 namespace {
 
@@ -108,6 +111,10 @@ void Unpack(const PixelFormat& format,
       }
       return;
     case PixelFormat::Packing::kWord:
+      if constexpr (std::endian::native == std::endian::little) {
+        std::memcpy(counts.data(), bytes.data(), 2 * counts.size());
+        return;
+      }
       for (std::size_t k = 0; k < counts.size(); ++k) {
         counts[k] = Join(bytes[2 * k], bytes[2 * k + 1], 8);
       }

@@ -1,6 +1,7 @@
 #include "acquire/session.h"
 
 #include "acquire/frame_file.h"
+#include "acquire/mosaic.h"
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -170,8 +171,9 @@ void WriteManifest(const std::filesystem::path& folder,
   WriteJson(folder / "session.json", json);
 }
 
-SessionReader::SessionReader(std::filesystem::path folder)
+SessionReader::SessionReader(std::filesystem::path folder, FrameView view)
     : folder_(std::move(folder)),
+      view_(view),
       manifest_(ReadManifest(folder_)),
       rig_(RigOf(manifest_, folder_)),
       schedule_(rig_) {
@@ -244,6 +246,9 @@ Frame SessionReader::ReadFrame(std::int64_t number) const {
                               frame.height,
                               manifest_.camera.width,
                               manifest_.camera.height));
+  }
+  if (view_ == FrameView::kGrey) {
+    MakeGrey(frame, manifest_.camera.mosaic);
   }
   frame.exposure_us = entry.exposure_us;
   frame.frame_id = entry.frame_id;

@@ -37,6 +37,12 @@ SessionManifest ReadManifest(const std::filesystem::path& folder);
 void WriteManifest(const std::filesystem::path& folder,
                    const SessionManifest& manifest);
 
+/// How a colour camera's frames are read; a monochrome one's are the same either way.
+enum class FrameView {
+  kRaw,   ///< as the sensor gave them
+  kGrey,  ///< by MakeGrey, for whoever looks for shapes only
+};
+
 /// A session folder opened for reading:
 ///
 ///   session.json       the manifest
@@ -49,7 +55,7 @@ class SessionReader {
   /// Throws BadData for a folder that is no session, a manifest that doesn't parse, or
   /// a journal with a bad line before a good one. A torn end is ignored: those pictures
   /// weren't taken.
-  explicit SessionReader(std::filesystem::path folder);
+  explicit SessionReader(std::filesystem::path folder, FrameView view = FrameView::kRaw);
 
   const std::filesystem::path& folder() const { return folder_; }
   const SessionManifest& manifest() const { return manifest_; }
@@ -75,6 +81,7 @@ class SessionReader {
 
  private:
   std::filesystem::path folder_;
+  FrameView view_;
   SessionManifest manifest_;
   RigDescription rig_;
   Schedule schedule_;

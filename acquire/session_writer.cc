@@ -282,10 +282,10 @@ void SessionWriter::Append(const Frame& frame) {
                                   figures.largest,
                                   camera.bit_depth));
   }
-  const std::string bytes = EncodeFrame(frame, camera.bit_depth);
+  EncodeFrame(frame, camera.bit_depth, encoded_);
   entry.exposure_us = frame.exposure_us;
   entry.file = FrameFileName(entry.number);
-  entry.hash = HashHex(bytes.data(), bytes.size());
+  entry.hash = HashHex(encoded_.data(), encoded_.size());
   entry.frame_id = frame.frame_id;
   entry.timestamp_ns = frame.timestamp_ns;
   entry.attempts = frame.attempts;
@@ -294,7 +294,7 @@ void SessionWriter::Append(const Frame& frame) {
   entry.temperature_c = frame.temperature_c;
   entry.largest = figures.largest;
   entry.bright = figures.bright;
-  WriteFrameFile(folder_ / entry.file, bytes, durable_);
+  WriteFrameFile(folder_ / entry.file, encoded_, durable_);
   Commit(std::move(entry));
 }
 

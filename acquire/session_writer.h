@@ -97,6 +97,7 @@ class SessionWriter {
   bool durable_ = false;
   std::unique_ptr<JournalWriter> journal_;
   std::vector<JournalEntry> entries_;
+  std::string encoded_;  // kept for its memory
   std::int64_t dropped_count_ = 0;
 };
 

@@ -20,6 +20,10 @@ if(TARGET nacre)
   install(TARGETS nacre RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(DIRECTORY cli/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
 endif()
+if(TARGET nacre_acquire)
+  install(FILES acquire/70-nacre-camera.rules
+    DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
+endif()
 if(TARGET nacre-laser-watchdog)
   install(TARGETS nacre-laser-watchdog
     RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/nacre)

@@ -181,6 +181,7 @@ struct GigeCameraTwin::Parts {
     Set(kHeight, static_cast<std::uint32_t>(options.height));
     Set(kPixelFormat, 0x01080001);
     Set(kExposure, 10'000);
+    Set(kTemperature, 41);
     SetPayload();
     frame_id = 0;
     controller.reset();
@@ -222,7 +223,7 @@ struct GigeCameraTwin::Parts {
       last_heard = Clock::now();
     } else if (at == kTriggerSoftware && Get(kAcquisition) == 1 &&
                Get(kTriggerSource) == 0) {
-      Trigger();
+      triggered = true;
     }
     SetPayload();
     return 0;
@@ -232,7 +233,7 @@ struct GigeCameraTwin::Parts {
     std::array<std::uint8_t, 2048> request{};
     sockaddr_in from{};
     const std::size_t size = from_socket.Receive(request, from);
-    const std::lock_guard lock(mutex);
+    std::unique_lock lock(mutex);
     if (size < 8 || request[0] != 0x42 || silent) {
       return;
     }
@@ -269,7 +270,9 @@ struct GigeCameraTwin::Parts {
       default:
         status = kNotImplemented;
     }
-    if (silent) {
+    if (triggered && unplug_for) {
+      triggered = false;
+      Trigger(lock);
       return;
     }
     Bytes answer;
@@ -279,9 +282,13 @@ struct GigeCameraTwin::Parts {
     Append(answer, &request[6], &request[8]);
     Append(answer, data.data(), data.data() + data.size());
     control.Send(answer, from);
+    if (triggered) {
+      triggered = false;
+      Trigger(lock);
+    }
   }
 
-  void Trigger() {
+  void Trigger(std::unique_lock<std::mutex>& lock) {
     if (unplug_for) {
       silent = true;
       back_at = Clock::now() + *unplug_for;
@@ -294,26 +301,47 @@ struct GigeCameraTwin::Parts {
       script.pop_front();
     }
     if (fault != CameraFault::kNoFrame) {
-      SendFrame(fault);
+      SendFrame(fault, lock);
     }
   }
 
-  Bytes Image() const {
+  // Which may take a while: the control channel's registers stay free meanwhile.
+  std::vector<std::uint16_t> Picture(std::unique_lock<std::mutex>& lock) const {
+    if (!options.picture) {
+      return {};
+    }
+    const std::uint64_t number = Get(kUserDefinedValue);
+    const double exposure_us = Get(kExposure);
+    lock.unlock();
+    std::vector<std::uint16_t> picture = options.picture(number, exposure_us);
+    lock.lock();
+    Expect(picture.size() == static_cast<std::size_t>(options.width) *
+                                 static_cast<std::size_t>(options.height),
+           "a count for each pixel of the sensor");
+    return picture;
+  }
+
+  Bytes Image(const std::vector<std::uint16_t>& picture) const {
     const int bits = BitsPerPixel();
-    const std::uint32_t max = Get(kPixelFormat) == 0x01100007 ? 0xFFFF
-                              : bits == 8                     ? 0xFF
-                                                              : 0xFFF;
+    const std::uint32_t code = Get(kPixelFormat);
+    const bool is_deep = code == 0x01100007 || code == 0x01100031;
+    const std::uint32_t max = is_deep                       ? 0xFFFF
+                              : bits % 8 == 0 && bits != 16 ? 0xFF
+                                                            : 0xFFF;
+    const int samples = bits == 24 ? 3 : 1;
     const double exposure_us = Get(kExposure);
     Bytes image;
     std::uint32_t even = 0;  // of a pair of 12-bit counts
-    const auto width = static_cast<int>(Get(kWidth));
+    const auto left = static_cast<int>(Get(kOffsetX)) * samples;
+    const auto top = static_cast<int>(Get(kOffsetY));
+    const auto width = static_cast<int>(Get(kWidth)) * samples;
     for (int y = 0; y < static_cast<int>(Get(kHeight)); ++y) {
       for (int x = 0; x < width; ++x) {
         const std::uint32_t count =
             std::min(max,
-                     options.count(x + static_cast<int>(Get(kOffsetX)),
-                                   y + static_cast<int>(Get(kOffsetY)),
-                                   exposure_us));
+                     picture.empty() ? options.count(x + left, y + top, exposure_us)
+                                     : std::uint32_t{picture[static_cast<std::size_t>(
+                                           (y + top) * options.width + x + left)]});
         if (bits == 12 && x % 2 == 0) {
           even = count;
         } else if (bits == 12) {
@@ -345,13 +373,16 @@ struct GigeCameraTwin::Parts {
                                 static_cast<std::uint16_t>(Get(kStreamPort))));
   }
 
-  void SendFrame(CameraFault fault) {
+  void SendFrame(CameraFault fault, std::unique_lock<std::mutex>& lock) {
+    const Bytes image = Image(Picture(lock));
+    if (silent) {
+      return;  // unplugged while it exposed
+    }
     const int steps = fault == CameraFault::kSkipId ? 2 : 1;
     for (int step = 0; step < steps; ++step) {
       frame_id = static_cast<std::uint16_t>(frame_id + 1);
       frame_id = frame_id == 0 ? std::uint16_t{1} : frame_id;
     }
-    const Bytes image = Image();
     const auto now_ns =
         static_cast<std::uint64_t>(Clock::now().time_since_epoch().count());
     std::vector<Bytes> packets{StreamPacket(1, 0)};
@@ -418,6 +449,7 @@ struct GigeCameraTwin::Parts {
   std::optional<sockaddr_in> controller;
   Clock::time_point last_heard;
   bool silent = false;
+  bool triggered = false;
   bool taken_by_another = false;
   std::optional<std::chrono::milliseconds> unplug_for;
   std::optional<Clock::time_point> back_at;
@@ -460,9 +492,9 @@ void GigeCameraTwin::UnplugAtNextTrigger(std::chrono::milliseconds away) {
 }
 
 void GigeCameraTwin::PulseLine() {
-  const std::lock_guard lock(parts_->mutex);
+  std::unique_lock lock(parts_->mutex);
   if (parts_->Get(kAcquisition) == 1 && parts_->Get(kTriggerSource) == 1) {
-    parts_->Trigger();
+    parts_->Trigger(lock);
   }
 }
 

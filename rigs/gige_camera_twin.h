@@ -24,6 +24,12 @@ struct GigeCameraTwinOptions {
   /// The count of pixel (x, y) of the sensor after an exposure. Cut to the bit depth.
   std::function<std::uint32_t(int x, int y, double exposure_us)> count =
       [](int x, int y, double) { return static_cast<std::uint32_t>(x + 7 * y); };
+  /// Instead of `count`, if not empty: the whole sensor, row by row, for the number
+  /// that the driver wrote into the feature UserDefinedValue. Called once a trigger,
+  /// never twice at a time.
+  std::function<std::vector<std::uint16_t>(std::uint64_t picture_number,
+                                           double exposure_us)>
+      picture = {};
 };
 
 /// A GigE Vision camera that exists only on the loopback interface: answers GVCP
@@ -31,8 +37,10 @@ struct GigeCameraTwinOptions {
 /// against it. Has an address 127.x.y.z of its own, so that several can be up at once,
 /// in several processes too. It is found by broadcast as well.
 ///
-/// Mono8, Mono12, Mono12p, Mono16; ExposureTime in whole µs in [10, 1e6]; Gain in whole
-/// units in [0, 24]; region in steps of 4; software trigger and Line1. Resends nothing.
+/// Mono8, Mono12, Mono12p, Mono16, BayerRG8, BayerGB12, BayerRG12p, BayerBG16; RGB8,
+/// whose counts of pixel x are those of x' = 3x, 3x + 1, 3x + 2. ExposureTime in whole
+/// µs in [10, 1e6]; Gain in whole units in [0, 24]; region in steps of 4; software
+/// trigger and Line1; DeviceTemperature is 41. Resends nothing.
 class GigeCameraTwin {
  public:
   explicit GigeCameraTwin(const GigeCameraTwinOptions& options = {});

@@ -90,7 +90,9 @@ std::string GigeCameraXml(int width, int height) {
                                             "AcquisitionMode",
                                             "TriggerSource",
                                             "TriggerSoftware",
-                                            "TriggerSelector"};
+                                            "TriggerSelector",
+                                            "UserDefinedValue",
+                                            "DeviceTemperature"};
   std::string features;
   for (const std::string_view feature : kFeatures) {
     features += fmt::format("<pFeature>{}</pFeature>", feature);
@@ -114,7 +116,12 @@ std::string GigeCameraXml(int width, int height) {
                      {{"Mono8", 0x01080001U},
                       {"Mono12", 0x01100005U},
                       {"Mono12p", 0x010C0047U},
-                      {"Mono16", 0x01100007U}}) +
+                      {"Mono16", 0x01100007U},
+                      {"BayerRG8", 0x01080009U},
+                      {"BayerGB12", 0x01100012U},
+                      {"BayerRG12p", 0x010C0059U},
+                      {"BayerBG16", 0x01100031U},
+                      {"RGB8", 0x02180014U}}) +
          Float("ExposureTime", kExposure, {10, 1'000'000, 1}) +
          Float("Gain", kGain, {0, 24, 1}) +
          Enumeration("AcquisitionMode", kAcquisitionMode, {{"Continuous", 0}}) +
@@ -124,6 +131,8 @@ std::string GigeCameraXml(int width, int height) {
          Enumeration("TriggerMode", kTriggerMode, {{"Off", 0}, {"On", 1}}) +
          Enumeration("TriggerSource", kTriggerSource, {{"Software", 0}, {"Line1", 1}}) +
          Command("TriggerSoftware", kTriggerSoftware, 1) +
+         Integer("UserDefinedValue", kUserDefinedValue, {0, 0x7FFFFFFF, 1}) +
+         Float("DeviceTemperature", kTemperature, {-50, 150, 1}) +
          "<Port Name=\"Device\" NameSpace=\"Standard\"></Port>\n"
          "</RegisterDescription>\n";
 }

@@ -41,6 +41,8 @@ enum GigeRegister : std::uint32_t {
   kTriggerSoftware = 0x802C,
   kTriggerSelector = 0x8030,
   kPayload = 0x8034,
+  kUserDefinedValue = 0x8038,
+  kTemperature = 0x803C,
   kXml = 0x10000,
 };
 

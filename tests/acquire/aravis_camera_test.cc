@@ -60,6 +60,8 @@ struct FormatCase {
   const char* name;
   int bit_depth;
   std::uint32_t max;
+  const char* mosaic = "";
+  int samples = 1;
 };
 
 class AravisFormatTest : public ::testing::TestWithParam<FormatCase> {};
@@ -77,14 +79,16 @@ TEST_P(AravisFormatTest, CountsArriveBitForBit) {
   EXPECT_EQ(info.model, "Nacre GigeTwin");
   EXPECT_EQ(info.serial, "T1");
   EXPECT_EQ(info.bit_depth, GetParam().bit_depth);
+  EXPECT_EQ(info.mosaic, GetParam().mosaic);
   for (const double exposure_us : {100.0, 900.0}) {
     camera.SetExposureUs(exposure_us);
     const Frame frame = Take(camera);
-    ASSERT_EQ(frame.counts.size(), std::size_t{68} * 36);
+    const int row = 68 * GetParam().samples;
+    ASSERT_EQ(frame.counts.size(), static_cast<std::size_t>(row) * 36);
     EXPECT_EQ(frame.exposure_us, exposure_us);
     for (int y = 0; y < 36; ++y) {
-      for (int x = 0; x < 68; ++x) {
-        ASSERT_EQ(frame.counts[static_cast<std::size_t>(y * 68 + x)],
+      for (int x = 0; x < row; ++x) {
+        ASSERT_EQ(frame.counts[static_cast<std::size_t>(y * row + x)],
                   std::min(GetParam().max, count(x, y, exposure_us)))
             << x << ' ' << y;
       }
@@ -97,7 +101,12 @@ INSTANTIATE_TEST_SUITE_P(Aravis,
                          ::testing::Values(FormatCase{"Mono8", 8, 0xFF},
                                            FormatCase{"Mono12", 12, 0xFFF},
                                            FormatCase{"Mono12p", 12, 0xFFF},
-                                           FormatCase{"Mono16", 16, 0xFFFF}),
+                                           FormatCase{"Mono16", 16, 0xFFFF},
+                                           FormatCase{"BayerRG8", 8, 0xFF, "RGGB"},
+                                           FormatCase{"BayerGB12", 12, 0xFFF, "GBRG"},
+                                           FormatCase{"BayerRG12p", 12, 0xFFF, "RGGB"},
+                                           FormatCase{"BayerBG16", 16, 0xFFFF, "BGGR"},
+                                           FormatCase{"RGB8", 8, 0xFF, "RGB", 3}),
                          [](const auto& name) { return name.param.name; });
 
 TEST(AravisCameraTest, ExposuresAreRoundedAndReadBack) {
@@ -131,9 +140,9 @@ TEST(AravisCameraTest, SaysWhatTheCameraTakesInstead) {
     return MessageOf([&] { const AravisCamera camera(options); });
   };
   EXPECT_THAT(message([](auto& o) { o.pixel_format = "Mono14"; }),
-              HasSubstr("it has Mono8, Mono12, Mono12p, Mono16; Nacre reads Mono8, "));
-  EXPECT_THAT(message([](auto& o) { o.pixel_format = "RGB8"; }),
-              HasSubstr("'RGB8' isn't a pixel format that Nacre reads"));
+              HasSubstr("it has Mono8, Mono12, Mono12p, Mono16, BayerRG8, "));
+  EXPECT_THAT(message([](auto& o) { o.pixel_format = "YUV8"; }),
+              HasSubstr("'YUV8' isn't a pixel format that Nacre reads"));
   EXPECT_THAT(message([](auto& o) { o.trigger = "Line7"; }),
               AllOf(HasSubstr("'Line7'"), HasSubstr("it has Software, Line1")));
   EXPECT_THAT(message([](auto& o) { o.gain = 25; }),
@@ -142,6 +151,76 @@ TEST(AravisCameraTest, SaysWhatTheCameraTakesInstead) {
                 o.region = SensorRegion{0, 0, 4000, 16};
               }),
               HasSubstr("set the size of its region"));
+}
+
+TEST(AravisCameraTest, AFrameTellsWhatTheCameraTells) {
+  const GigeCameraTwin twin;
+  AravisOptions options = OptionsOf(twin);
+  options.gain = 5;
+  AravisCamera camera(options);
+  const Frame frame = Take(camera);
+  EXPECT_EQ(frame.gain, 5);
+  EXPECT_EQ(frame.temperature_c, 41);
+  EXPECT_GT(frame.timestamp_ns, 0);
+  EXPECT_EQ(frame.resent_packets, 0U);
+}
+
+TEST(AravisCameraTest, ThePicturesNumberGoesToTheCamera) {
+  rigs::GigeCameraTwinOptions device{.width = 16, .height = 8};
+  device.picture = [](std::uint64_t number, double exposure_us) {
+    return std::vector<std::uint16_t>(
+        128,
+        static_cast<std::uint16_t>(100 * number +
+                                   static_cast<std::uint64_t>(exposure_us)));
+  };
+  const GigeCameraTwin twin(device);
+  AravisCamera camera(OptionsOf(twin));
+  camera.SetExposureUs(20);
+  Take(camera);
+  for (const std::uint64_t number : {7, 8, 600}) {
+    const auto frame = camera.Capture(number, kTimeout);
+    ASSERT_TRUE(frame);
+    EXPECT_EQ(frame->counts.front(), 100 * number + 20);
+  }
+}
+
+// The next frames come while nobody has looked at the last ones.
+TEST(AravisCameraTest, PackedFramesKeepTheirCountsForAsLongAsOneLikes) {
+  rigs::GigeCameraTwinOptions device{.width = 16, .height = 8};
+  device.picture = [](std::uint64_t number, double) {
+    return std::vector<std::uint16_t>(128, static_cast<std::uint16_t>(number));
+  };
+  const GigeCameraTwin twin(device);
+  std::vector<PackedFrame> kept;
+  {
+    AravisCamera camera(OptionsOf(twin));
+    Take(camera);
+    for (std::uint64_t number = 1; number <= 20; ++number) {
+      auto packed = camera.CapturePacked(number, kTimeout);
+      ASSERT_TRUE(packed);
+      kept.push_back(std::move(*packed));
+    }
+    EXPECT_EQ(std::move(kept[0]).Unpacked().counts.back(), 1);
+  }
+  for (std::size_t k = 1; k < kept.size(); ++k) {  // after the camera was closed, too
+    EXPECT_EQ(std::move(kept[k]).Unpacked().counts.back(), k + 1);
+  }
+}
+
+TEST(AravisCameraTest, ItSaysThatItIsAwayAndThatItIsBack) {
+  GigeCameraTwin twin;
+  AravisCamera camera(OptionsOf(twin));
+  Take(camera);
+  std::vector<bool> heard;
+  camera.OnAway([&](bool away) {
+    heard.push_back(away);
+    if (away) {
+      twin.Plug();
+    }
+  });
+  twin.GiveControlAway();
+  EXPECT_FALSE(camera.Capture(1, kTimeout));
+  EXPECT_EQ(heard, (std::vector<bool>{true, false}));
 }
 
 TEST(AravisCameraTest, OneProgramControlsACamera) {

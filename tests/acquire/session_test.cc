@@ -123,6 +123,34 @@ TEST(Session, AFlippedBitInAFrameIsNoticed) {
               HasSubstr("000002.pgm: doesn't match its checksum"));
 }
 
+TEST(Session, AColourCamerasFramesAreKeptRawAndReadGreyIfOneLikes) {
+  for (const std::string mosaic : {"RGGB", "RGB"}) {
+    const TempFolder folder;
+    FakeRig fake;
+    SessionManifest manifest = fake.Manifest(TestRig());
+    manifest.camera.mosaic = mosaic;
+    auto session = SessionWriter::Create(folder / "s", manifest, false);
+    Frame frame{.width = 6, .height = 4, .counts = {}};
+    const std::size_t count = mosaic == "RGB" ? 72 : 24;
+    for (std::size_t k = 0; k < count; ++k) {
+      frame.counts.push_back(static_cast<std::uint16_t>(10 * k));
+    }
+    session.Append(frame);
+    const SessionReader raw(folder / "s");
+    EXPECT_EQ(raw.manifest().camera.mosaic, mosaic);
+    EXPECT_EQ(raw.ReadFrame(0).counts, frame.counts);
+    const Frame grey = SessionReader(folder / "s", FrameView::kGrey).ReadFrame(0);
+    ASSERT_EQ(grey.counts.size(), 24U);
+    // By hand: (0 + 10 + 60 + 70) / 4, and (0 + 10 + 20) / 3.
+    EXPECT_EQ(grey.counts[0], mosaic == "RGB" ? 10 : 35);
+    EXPECT_EQ(grey.counts[23], mosaic == "RGB" ? 700 : grey.counts[16]);
+    manifest.camera.mosaic = "";
+    EXPECT_THAT(ErrorOf([&] { SessionWriter::Resume(folder / "s", manifest, false); }),
+                ::testing::AnyOf(HasSubstr("begun with the camera"),
+                                 HasSubstr("is capturing into this session")));
+  }
+}
+
 TEST(Session, FoldersThatAreNone) {
   const TempFolder folder;
   EXPECT_THAT(ErrorOf([&] { SessionReader{folder.path()}; }),
