@@ -76,6 +76,7 @@ struct HeliosIlluminator::Parts {
     std::unique_lock lock(mutex);
     while (!stop.stop_requested()) {
       feeder.Step();
+      ++steps;
       changed.notify_all();
       const bool busy = feeder.HasDac() && !(IsDark() && feeder.IsSteady());
       woken.wait_for(lock, stop, busy ? kPause : kIdlePause, [this] { return asked; });
@@ -84,6 +85,18 @@ struct HeliosIlluminator::Parts {
   }
 
   bool IsDark() const { return feeder.state() != LaserState::kLit && !wants_light; }
+
+  // The DAC is asked after this was called: it may have gone before the last answer.
+  std::int64_t CountInterruptions() {
+    std::unique_lock lock(mutex);
+    if (wants_light) {
+      const std::int64_t wanted = steps + 1;
+      asked = true;
+      woken.notify_all();
+      changed.wait(lock, [&] { return steps >= wanted; });
+    }
+    return feeder.CountInterruptions();
+  }
 
   // The feeder is told something by `tell` and goes on at once.
   template <class Tell>
@@ -122,6 +135,7 @@ struct HeliosIlluminator::Parts {
   std::condition_variable changed;
   bool asked = false;
   bool wants_light = false;
+  std::int64_t steps = 0;
   LaserFeeder feeder;
   std::jthread thread;
 };
@@ -215,8 +229,7 @@ void HeliosIlluminator::AwaitSteady() {
 }
 
 std::int64_t HeliosIlluminator::Interruptions() const {
-  const std::lock_guard lock(parts_->mutex);
-  return parts_->feeder.interruptions();
+  return parts_->CountInterruptions();
 }
 
 }  // namespace nacre::acquire

@@ -8,6 +8,9 @@ nacre_stage(laser
   PUBLIC
     nacre::core)
 target_link_libraries(nacre_acquire PUBLIC nacre::laser)
+target_sources(nacre_acquire
+  PUBLIC FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES rig_light.h
+  PRIVATE rig_light.cc)
 
 option(NACRE_WITH_HELIOS "Laser projectors behind Helios DACs (needs libusb 1.0)" ON)
 if(NACRE_WITH_HELIOS)

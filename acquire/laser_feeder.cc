@@ -112,6 +112,19 @@ bool LaserFeeder::IsSteady() const {
                 : dark_sent_ && settings_.clock_s() >= dark_by_s_;
 }
 
+// Whether the last frame sent may have ended.
+bool LaserFeeder::IsLate() const {
+  return shown_ && sent_ > 0 && settings_.clock_s() > begins_s_ + shown_->Seconds();
+}
+
+std::int64_t LaserFeeder::CountInterruptions() {
+  if (IsSteady() && IsLate()) {
+    ++interruptions_;
+    sent_ = 1;  // until the next frame is known to be in time
+  }
+  return interruptions_;
+}
+
 void LaserFeeder::Step() noexcept {
   try {
     if (!dac_) {

@@ -51,8 +51,8 @@ class LaserFeeder {
 
   /// What was asked for last is put out, and the next frame waits in the DAC.
   bool IsSteady() const;
-  /// Lit frames that were due and may have come late or not at all.
-  std::int64_t interruptions() const { return interruptions_; }
+  /// How often lit frames that were due may have come late or not at all, until now.
+  std::int64_t CountInterruptions();
   /// Why the light isn't to be had, if so: the DAC stayed away, or a frame was refused,
   /// which disarms. Cleared by Arm and by Show.
   const std::optional<std::string>& failure() const { return failure_; }
@@ -65,6 +65,7 @@ class LaserFeeder {
   void CloseShutter() noexcept;
   void Reopen();
   void Feed();
+  bool IsLate() const;
   void FeedDark();
   void FeedLit();
   bool Send(LaserFrame frame);

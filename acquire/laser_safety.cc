@@ -5,14 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <map>
 
 namespace nacre::acquire {
 namespace {
 
 // Places closer than this are one, so that no jitter by a step passes for a pause.
 constexpr int kPlaceSteps = 16;
-constexpr int kPlaces = (4095 / kPlaceSteps) + 1;  // along an axis
-constexpr std::size_t kMostPoints = 4095;          // that a Helios takes
+constexpr std::size_t kMostPoints = 4095;  // that a Helios takes
 
 double LongestStretchUs(const LaserFrame& frame) {
   std::size_t longest = 0;
@@ -36,28 +36,23 @@ double LongestStretchUs(const LaserFrame& frame) {
 // Of the frame's time, in the place that is lit longest. A place is a window of two by
 // two cells, wherever it lies, so that a cell's edge halves nothing.
 double LargestDuty(const LaserFrame& frame) {
-  std::vector<int> cells(std::size_t{kPlaces} * kPlaces);
-  const auto index = [](int x, int y) {
-    return static_cast<std::size_t>(y) * kPlaces + static_cast<std::size_t>(x);
-  };
+  std::map<std::pair<int, int>, int> lit;  // points a cell
   for (const LaserPoint& point : frame.points) {
     if (point.IsLit()) {
-      ++cells[index(point.x / kPlaceSteps, point.y / kPlaceSteps)];
+      ++lit[{point.x / kPlaceSteps, point.y / kPlaceSteps}];
     }
   }
+  const auto count = [&](int x, int y) {
+    const auto cell = lit.find({x, y});
+    return cell == lit.end() ? 0 : cell->second;
+  };
   int most = 0;
-  for (const LaserPoint& point : frame.points) {
-    if (!point.IsLit()) {
-      continue;
-    }
-    const int x = std::min(point.x / kPlaceSteps, kPlaces - 2);
-    const int y = std::min(point.y / kPlaceSteps, kPlaces - 2);
-    for (int left = std::max(0, x - 1); left <= x; ++left) {
-      for (int low = std::max(0, y - 1); low <= y; ++low) {
-        most =
-            std::max(most,
-                     cells[index(left, low)] + cells[index(left + 1, low)] +
-                         cells[index(left, low + 1)] + cells[index(left + 1, low + 1)]);
+  for (const auto& [cell, points] : lit) {
+    for (const int left : {cell.first - 1, cell.first}) {
+      for (const int low : {cell.second - 1, cell.second}) {
+        most = std::max(most,
+                        count(left, low) + count(left + 1, low) + count(left, low + 1) +
+                            count(left + 1, low + 1));
       }
     }
   }

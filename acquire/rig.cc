@@ -1,6 +1,7 @@
 #include "acquire/rig.h"
 
 #include "acquire/pixel_format.h"
+#include "acquire/rig_light.h"
 #include "core/atomic_file.h"
 #include "core/hash.h"
 
@@ -280,6 +281,9 @@ RigDescription ParseRig(const std::string& text, const std::filesystem::path& pa
   rig.scanner = ReadScanner(root.Table("scanner"));
   rig.schedule = ReadSchedule(root.FindTable("schedule"), rig.grid.core);
   rig.adaptive = ReadAdaptive(root.FindTable("adaptive"));
+  if (is_hardware) {
+    ReadLight(root, rig);
+  }
   root.Has("simulated");  // belongs to rigs/, which checks it
   root.RejectUnknownKeys();
   return rig;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "acquire/aravis_options.h"
+#include "acquire/helios_options.h"
 #include "acquire/scan_map.h"
 #include "core/toml.h"
 
@@ -87,6 +88,12 @@ struct AdaptiveDescription {
   double noise_sigmas = 20;    ///< of the dark: what is above needs no longer exposure
 };
 
+/// [illuminator] and [safety]
+struct LightDescription {
+  HeliosOptions device;  ///< [illuminator.device]
+  SafetyDescription safety;
+};
+
 /// A rig and what is to be captured with it, as written in rig.toml.
 struct RigDescription {
   std::filesystem::path path;  ///< of rig.toml
@@ -99,6 +106,7 @@ struct RigDescription {
   TargetsDescription targets;
   ScannerDescription scanner;
   ScheduleDescription schedule;
+  std::optional<LightDescription> illuminator;  ///< none: kind "simulated", or no laser
   std::optional<AdaptiveDescription> adaptive;  ///< none: every picture is taken
 
   int ChannelCount() const { return static_cast<int>(scanner.channels.size()); }

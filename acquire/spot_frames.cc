@@ -51,21 +51,6 @@ std::optional<int> CyclesPerFrame(int cycle_points, int points_per_s) {
   return std::nullopt;
 }
 
-// A walk over n places whose steps have no divisor in common with n and are near to
-// n times the golden section: it comes near to where it was as late as can be.
-std::vector<std::size_t> SpreadOrder(std::size_t n) {
-  auto stride = static_cast<std::size_t>(
-      std::max(1.0, std::round(0.38196601125 * static_cast<double>(n))));
-  while (std::gcd(stride, n) != 1) {
-    ++stride;
-  }
-  std::vector<std::size_t> order(n);
-  for (std::size_t k = 0; k < n; ++k) {
-    order[k] = k * stride % n;
-  }
-  return order;
-}
-
 struct Place {
   std::uint16_t x = 0;
   std::uint16_t y = 0;
@@ -139,17 +124,16 @@ LaserFrame MakeSpotFrame(const SpotTiming& timing,
   const std::uint8_t intensity = *std::max_element(level.begin(), level.end());
   LaserFrame frame;
   frame.points_per_s = timing.points_per_s;
-  const std::vector<std::size_t> order = SpreadOrder(places.size());
   const auto cycle_points = static_cast<std::size_t>(timing.cycle_points);
   for (int cycle = 0; cycle < timing.cycles_per_frame; ++cycle) {
     std::size_t next = 0;
-    LaserPoint point{.x = places[order[0]].x, .y = places[order[0]].y};
+    LaserPoint point{.x = places[0].x, .y = places[0].y};
     const std::size_t begin = frame.points.size();
     for (std::size_t slot = 0; slot < slots; ++slot) {
       // Spots are spread over the slots as evenly as may be.
       const bool used = next < places.size() && slot == next * slots / places.size();
       if (used) {
-        point = {.x = places[order[next]].x, .y = places[order[next]].y};
+        point = {.x = places[next].x, .y = places[next].y};
         ++next;
       }
       frame.points.insert(

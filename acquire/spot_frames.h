@@ -36,9 +36,8 @@ SpotTiming PlanSpots(std::span<const double> exposures_us,
                      double settle_us,
                      int points_per_s);
 
-/// A frame of whole cycles over the spots, first and last point dark. Neighbours are
-/// visited far from each other in time, which spreads the heat. Spots that fall on the
-/// same step are one. Requires that there is a slot for each.
+/// A frame of whole cycles over the spots in their order, first and last point dark.
+/// Spots that fall on the same step are one. Requires that there is a slot for each.
 LaserFrame MakeSpotFrame(const SpotTiming& timing,
                          const ScanField& field,
                          std::span<const ScanAngle> spots,

@@ -19,6 +19,8 @@ install(FILES
 if(TARGET nacre)
   install(TARGETS nacre RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(DIRECTORY cli/scenes DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
+  install(DIRECTORY presets/ DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre/presets
+    PATTERN phantoms EXCLUDE PATTERN README.md EXCLUDE)
 endif()
 if(TARGET nacre_acquire)
   install(FILES acquire/70-nacre-camera.rules
@@ -27,7 +29,7 @@ endif()
 if(TARGET nacre-laser-watchdog)
   install(TARGETS nacre-laser-watchdog
     RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/nacre)
-  install(FILES acquire/99-nacre-helios.rules
+  install(FILES acquire/70-nacre-helios.rules
     DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre)
 endif()
 if(NACRE_WITH_RIGS)

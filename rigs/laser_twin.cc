@@ -1,5 +1,6 @@
 #include "rigs/laser_twin.h"
 
+#include "acquire/scan_field.h"
 #include "core/error.h"
 
 #include <cmath>
@@ -114,7 +115,13 @@ void LaserTwin::Light(std::span<const acquire::ScanAngle> spots, int channel) {
       model_.RoundSigmaMm() * std::sqrt(model_.spot_aspect * model_.spot_aspect - 1);
   const PointMm apart = {apart_mm * std::cos(model_.spot_angle_rad),
                          apart_mm * std::sin(model_.spot_angle_rad)};
-  for (const acquire::ScanAngle& angle : WithHysteresis(spots, model_.hysteresis_rad)) {
+  std::vector<acquire::ScanAngle> sent(spots.begin(), spots.end());
+  if (model_.has_dac) {
+    for (acquire::ScanAngle& angle : sent) {
+      angle = acquire::ScanField{model_.max_angle_rad}.Snap(angle);
+    }
+  }
+  for (const acquire::ScanAngle& angle : WithHysteresis(sent, model_.hysteresis_rad)) {
     Spot spot = model_.SpotAt(angle);
     spot.beam = beam++;
     if (apart_mm > 0) {

@@ -27,6 +27,8 @@ struct LaserModel {
   /// Each mirror stops so far short of where it was sent, whichever side it comes from.
   /// Spots are visited in their order over and over, so the last precedes the first.
   double hysteresis_rad = 0;
+  /// The mirrors are driven by a DAC of 12 bits: beams go to its nearest steps.
+  bool has_dac = false;
   std::vector<double> power_mw;  ///< a channel; flux of one spot
   std::vector<std::string> channels;
   SamplePose sample;

@@ -116,7 +116,7 @@ HeliosUsb::HeliosUsb(UsbPlace place) : place_(place), context_(NewContext()) {
   if (result == LIBUSB_ERROR_ACCESS) {
     throw DeviceError(fmt::format(
         "laser DAC at USB {}:{}: no permission to open it; install "
-        "99-nacre-helios.rules (nacre doctor says where) and plug it in again",
+        "70-nacre-helios.rules (nacre doctor says where) and plug it in again",
         place.bus,
         place.address));
   }

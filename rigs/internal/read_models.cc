@@ -97,6 +97,7 @@ LaserModel ReadLaser(const TomlTable& table,
   }
   laser.offset_mm = {offset_mm[0], offset_mm[1]};
   laser.max_angle_rad = table.Number("max_angle_deg", 17, Range{0.1, 60}) * kDegree;
+  laser.has_dac = table.Boolean("dac", false);
   laser.spot_sigma_mm =
       table.Number("spot_sigma_mm", laser.spot_sigma_mm, Range{1e-3, 1e2});
   laser.spot_aspect = table.Number("spot_aspect", 1, Range{1, 10});

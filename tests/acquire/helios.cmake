@@ -1,3 +1,9 @@
+find_package(rapidcheck REQUIRED)
+nacre_test(laser
+  SOURCES
+    laser_safety_test.cc
+  LIBRARIES
+    nacre::laser rapidcheck)
 if(TARGET nacre_usb_twins)
   nacre_test(helios
     SOURCES

@@ -1,0 +1,103 @@
+#include "cli/hardware_rig.h"
+
+#include "acquire/aravis_camera.h"
+#include "acquire/helios_illuminator.h"
+#include "acquire/rig_light.h"
+#include "core/error.h"
+
+#include <fmt/format.h>
+#include <iostream>
+#include <string>
+
+namespace nacre::cli {
+namespace {
+
+std::string WhatToDo(acquire::Target target, int pose) {
+  using acquire::Target;
+  switch (target) {
+    case Target::kNothing:
+      return "put the lens cap on";
+    case Target::kCheckerboard:
+      return pose == 0
+                 ? "lay the checkerboard flat into the sample plane, its middle on "
+                   "the origin, and switch the lamp on"
+                 : "tilt the checkerboard another way";
+    case Target::kFlat:
+      return "put the white card in";
+    case Target::kReference:
+      return "switch the lamp off, lay the reflectance standard into the sample plane";
+    case Target::kGlare:
+      return "leave the reflectance standard where it is";
+    case Target::kAmbient:
+      return pose == 0 ? "leave the reflectance standard where it is"
+                       : "lay the sample into the sample plane";
+    case Target::kSample:
+      return "lay the sample into the sample plane";
+  }
+  throw LogicError("a target of no kind");
+}
+
+// Asks the person at the rig. The laser is dark meanwhile.
+class AskingStage final : public acquire::SampleStage {
+ public:
+  void Place(acquire::Target target, int pose) override {
+    std::cerr << fmt::format("place: {} {}: {}, then press Enter\n",
+                             acquire::Name(target),
+                             pose,
+                             WhatToDo(target, pose))
+              << std::flush;
+    std::string line;
+    if (!std::getline(std::cin, line)) {
+      throw Interrupted("nobody answers on standard input; --resume goes on");
+    }
+  }
+};
+
+class HardwareRig final : public RigDevices {
+ public:
+  explicit HardwareRig(acquire::RigDescription description)
+      : description_(std::move(description)),
+        camera_(*description_.camera.device),
+        laser_(description_.illuminator->device,
+               description_.illuminator->safety,
+               acquire::PlanSpots(description_),
+               description_.scanner.channels) {}
+
+  void Arm() { laser_.Arm(); }
+
+  const acquire::RigDescription& description() const override { return description_; }
+  acquire::Camera& camera() override { return camera_; }
+  acquire::Illuminator& illuminator() override { return laser_; }
+  acquire::SampleStage& stage() override { return stage_; }
+
+ private:
+  const acquire::RigDescription description_;
+  acquire::AravisCamera camera_;
+  AskingStage stage_;
+  acquire::HeliosIlluminator laser_;  // last, so that it is the first to end
+};
+
+}  // namespace
+
+std::unique_ptr<RigDevices> OpenHardwareRig(const std::filesystem::path& rig_toml,
+                                            bool arm_laser) {
+  acquire::RigDescription description = acquire::ReadRig(rig_toml);
+  if (!description.illuminator) {
+    throw BadData(fmt::format(
+        "{}: illuminator: a capture needs [illuminator.device] and [safety]; `nacre "
+        "doctor --camera {}` tries the camera alone",
+        rig_toml.string(),
+        rig_toml.string()));
+  }
+  if (!arm_laser) {
+    throw UsageError(fmt::format(
+        "{}: a capture with this rig switches a laser on. Once nobody is in "
+        "its way and goggles are worn, say so by --arm-laser",
+        rig_toml.string()));
+  }
+  auto rig = std::make_unique<HardwareRig>(std::move(description));
+  rig->Arm();
+  return rig;
+}
+
+}  // namespace nacre::cli
