@@ -112,17 +112,17 @@ void ExitanceField::Allocate(std::int64_t count) {
   }
 }
 
-Color ExitanceField::At(const SurfaceHit& hit, std::int64_t& evaluations) const {
+Color ExitanceField::At(const SurfaceHit& hit, PathCounters& counters) const {
   if (grid_size_ == 0) {
-    ++evaluations;
-    return subsurface_->Exitance(ToSurfacePoint(hit, mm_per_unit_));
+    ++counters.evaluations;
+    return subsurface_->Gather(ToSurfacePoint(hit, mm_per_unit_), counters.pairs);
   }
-  return columns_ == 0 ? AtMesh(hit, evaluations) : AtSphere(hit, evaluations);
+  return columns_ == 0 ? AtMesh(hit, counters) : AtSphere(hit, counters);
 }
 
 template <class MakePoint>
 Color ExitanceField::Lookup(std::int64_t slot,
-                            std::int64_t& evaluations,
+                            PathCounters& counters,
                             const MakePoint& make_point) const {
   Value& value = values_[static_cast<std::size_t>(slot)];
   const float r = value.r.load(std::memory_order_acquire);
@@ -132,39 +132,39 @@ Color ExitanceField::Lookup(std::int64_t slot,
             value.b.load(std::memory_order_relaxed)};
   }
   // Two threads may do this at once; they store the same.
-  ++evaluations;
-  const Color exitance = subsurface_->Exitance(make_point());
+  ++counters.evaluations;
+  const Color exitance = subsurface_->Gather(make_point(), counters.pairs);
   value.g.store(exitance.y, std::memory_order_relaxed);
   value.b.store(exitance.z, std::memory_order_relaxed);
   value.r.store(exitance.x, std::memory_order_release);
   return exitance;
 }
 
-Color ExitanceField::AtVertex(std::uint32_t vertex, std::int64_t& evaluations) const {
-  return Lookup(vertex, evaluations, [&] { return vertices_[vertex]; });
+Color ExitanceField::AtVertex(std::uint32_t vertex, PathCounters& counters) const {
+  return Lookup(vertex, counters, [&] { return vertices_[vertex]; });
 }
 
 Color ExitanceField::AtNode(const SurfaceHit& hit,
                             int i,
                             int j,
-                            std::int64_t& evaluations) const {
+                            PathCounters& counters) const {
   const int n = divisions_[hit.triangle];
   const std::int64_t slot = first_slot_[hit.triangle] + NodeSlot(i, j, n);
-  return Lookup(slot, evaluations, [&] {
+  return Lookup(slot, counters, [&] {
     const float step = 1.0F / static_cast<float>(n);
     const Vec2 barycentric{static_cast<float>(i) * step, static_cast<float>(j) * step};
     return ToSurfacePoint(MeshPoint(shape_, hit.triangle, barycentric), mm_per_unit_);
   });
 }
 
-Color ExitanceField::AtMesh(const SurfaceHit& hit, std::int64_t& evaluations) const {
+Color ExitanceField::AtMesh(const SurfaceHit& hit, PathCounters& counters) const {
   const float b1 = std::clamp(hit.barycentric.x, 0.0F, 1.0F);
   const float b2 = std::clamp(hit.barycentric.y, 0.0F, 1.0F - b1);
   const int n = divisions_[hit.triangle];
   if (n == 1) {
     const auto& t = std::get<TriangleMesh>(shape_.geometry).triangles[hit.triangle];
-    return AtVertex(t[0], evaluations) * (1 - b1 - b2) +
-           AtVertex(t[1], evaluations) * b1 + AtVertex(t[2], evaluations) * b2;
+    return AtVertex(t[0], counters) * (1 - b1 - b2) + AtVertex(t[1], counters) * b1 +
+           AtVertex(t[2], counters) * b2;
   }
   const float x = b1 * static_cast<float>(n);
   const float y = b2 * static_cast<float>(n);
@@ -172,19 +172,19 @@ Color ExitanceField::AtMesh(const SurfaceHit& hit, std::int64_t& evaluations) co
   const int j = std::min(static_cast<int>(y), n - 1 - i);
   const float fx = x - static_cast<float>(i);
   const float fy = y - static_cast<float>(j);
-  const Color right = AtNode(hit, i + 1, j, evaluations);
-  const Color top = AtNode(hit, i, j + 1, evaluations);
+  const Color right = AtNode(hit, i + 1, j, counters);
+  const Color top = AtNode(hit, i, j + 1, counters);
   if (fx + fy <= 1 || i + j + 2 > n) {
-    return AtNode(hit, i, j, evaluations) * (1 - fx - fy) + right * fx + top * fy;
+    return AtNode(hit, i, j, counters) * (1 - fx - fy) + right * fx + top * fy;
   }
-  return AtNode(hit, i + 1, j + 1, evaluations) * (fx + fy - 1) + right * (1 - fy) +
+  return AtNode(hit, i + 1, j + 1, counters) * (fx + fy - 1) + right * (1 - fy) +
          top * (1 - fx);
 }
 
-Color ExitanceField::AtLatitude(int i, int j, std::int64_t& evaluations) const {
+Color ExitanceField::AtLatitude(int i, int j, PathCounters& counters) const {
   const int column = i % columns_;
   const std::int64_t slot = std::int64_t{j} * columns_ + column;
-  return Lookup(slot, evaluations, [&] {
+  return Lookup(slot, counters, [&] {
     const auto& sphere = std::get<Sphere>(shape_.geometry);
     const float phi =
         2 * kPi * static_cast<float>(column) / static_cast<float>(columns_);
@@ -197,18 +197,17 @@ Color ExitanceField::AtLatitude(int i, int j, std::int64_t& evaluations) const {
   });
 }
 
-Color ExitanceField::AtSphere(const SurfaceHit& hit, std::int64_t& evaluations) const {
+Color ExitanceField::AtSphere(const SurfaceHit& hit, PathCounters& counters) const {
   const float x = hit.uv.x * static_cast<float>(columns_);
   const float y = hit.uv.y * static_cast<float>(rows_);
   const int i = std::clamp(static_cast<int>(x), 0, columns_ - 1);
   const int j = std::clamp(static_cast<int>(y), 0, rows_ - 1);
   const float fx = x - static_cast<float>(i);
   const float fy = y - static_cast<float>(j);
-  return (AtLatitude(i, j, evaluations) * (1 - fx) +
-          AtLatitude(i + 1, j, evaluations) * fx) *
+  return (AtLatitude(i, j, counters) * (1 - fx) + AtLatitude(i + 1, j, counters) * fx) *
              (1 - fy) +
-         (AtLatitude(i, j + 1, evaluations) * (1 - fx) +
-          AtLatitude(i + 1, j + 1, evaluations) * fx) *
+         (AtLatitude(i, j + 1, counters) * (1 - fx) +
+          AtLatitude(i + 1, j + 1, counters) * fx) *
              fy;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "render/shape.h"
+#include "render/exitance_source.h"
 
 #include <atomic>
 #include <cstdint>
@@ -16,7 +16,7 @@ namespace nacre::render {
 ///
 /// On a mesh the grid is the vertices where triangles are small, else a barycentric
 /// grid a triangle; on a sphere it is longitude and latitude.
-class ExitanceField {
+class ExitanceField final : public ExitanceSource {
  public:
   /// `spacing_mm`: at most this far apart; 0 asks the model at every hit. The
   /// references must outlive it.
@@ -24,8 +24,10 @@ class ExitanceField {
                 std::unique_ptr<const Subsurface> subsurface,
                 float spacing_mm);
 
-  /// At a hit of the shape. `evaluations` counts questions to the model.
-  Color At(const SurfaceHit& hit, std::int64_t& evaluations) const;
+  Color At(const SurfaceHit& hit, const ExitanceQuery& query) const override {
+    return At(hit, query.counters);
+  }
+  Color At(const SurfaceHit& hit, PathCounters& counters) const;
 
   /// Points of the grid; 0 if there is none because it was too large or not wanted.
   std::int64_t grid_size() const { return grid_size_; }
@@ -42,15 +44,15 @@ class ExitanceField {
   void PlanSphere(const Sphere& sphere, float spacing);
   void Allocate(std::int64_t count);
 
-  Color AtMesh(const SurfaceHit& hit, std::int64_t& evaluations) const;
-  Color AtSphere(const SurfaceHit& hit, std::int64_t& evaluations) const;
-  Color AtVertex(std::uint32_t vertex, std::int64_t& evaluations) const;
-  Color AtNode(const SurfaceHit& hit, int i, int j, std::int64_t& evaluations) const;
-  Color AtLatitude(int i, int j, std::int64_t& evaluations) const;
+  Color AtMesh(const SurfaceHit& hit, PathCounters& counters) const;
+  Color AtSphere(const SurfaceHit& hit, PathCounters& counters) const;
+  Color AtVertex(std::uint32_t vertex, PathCounters& counters) const;
+  Color AtNode(const SurfaceHit& hit, int i, int j, PathCounters& counters) const;
+  Color AtLatitude(int i, int j, PathCounters& counters) const;
 
   template <class MakePoint>
   Color Lookup(std::int64_t slot,
-               std::int64_t& evaluations,
+               PathCounters& counters,
                const MakePoint& make_point) const;
 
   const Shape& shape_;

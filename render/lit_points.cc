@@ -1,10 +1,11 @@
 #include "render/lit_points.h"
 
 #include "core/parallel.h"
-#include "render/bsdf/fresnel.h"
+#include "render/entering_light.h"
 #include "render/warp.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace nacre::render {
@@ -12,124 +13,114 @@ namespace {
 
 constexpr std::int64_t kBlock = 256;
 
-// Where the points are, before they see any light.
-struct Placement {
-  std::vector<std::uint32_t> triangle;  ///< empty for a sphere
-  std::int64_t count = 0;
-  double area = 0;  ///< scene units squared
+// Density falls by 4 from level to level.
+constexpr int kLevels = 4;
+// Level 1 starts at twice that many patches from what is seen, level 2 at 4 times, …
+constexpr float kDensePatches = 4;
+// A triangle with more points than this has levels of its own for each of them.
+constexpr std::int64_t kLargeTriangle = 64;
+
+// Where a point is, before it sees any light.
+struct Place {
+  std::uint32_t triangle;
+  std::uint32_t index;  ///< of the Sobol' sequence
+  std::uint8_t level;
 };
 
-// Triangle after triangle, as many points as its area deserves; remainders carry over,
-// so that each stretch of the surface is off by less than one point.
-Placement PlaceOnMesh(const TriangleMesh& mesh, double count) {
-  Placement placement;
-  placement.area = SurfaceArea(mesh);
-  const double per_area = count / placement.area;
-  double due = 0.5;
-  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
-    due += per_area * static_cast<double>(mesh.TriangleArea(i));
-    const double whole = std::floor(due);
-    due -= whole;
-    placement.triangle.insert(placement.triangle.end(),
-                              static_cast<std::size_t>(whole),
-                              static_cast<std::uint32_t>(i));
-  }
-  placement.count = static_cast<std::int64_t>(placement.triangle.size());
-  if (placement.count == 0) {  // a surface smaller than half a patch
-    placement.triangle.push_back(0);
-    placement.count = 1;
-  }
-  return placement;
-}
-
-SurfaceHit PlacePoint(const Shape& shape, const Placement& placement, std::int64_t i) {
-  const Vec2 u = SobolPoint(static_cast<std::uint32_t>(i));
+SurfaceHit PlacePoint(const Shape& shape, std::uint32_t triangle, std::uint32_t index) {
+  const Vec2 u = SobolPoint(index);
   if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
     return SpherePoint(shape, sphere->center + SquareToSphere(u) * sphere->radius);
   }
-  const std::uint32_t triangle = placement.triangle[static_cast<std::size_t>(i)];
   return MeshPoint(shape, triangle, SquareToTriangle(u));
 }
 
-// One point's light. F_t(η, θ_i) of it enters.
-class Gatherer {
+// Spreads points over a shape, densely where it is seen.
+class Placement {
  public:
-  Gatherer(const World& world,
-           const Translucency& translucency,
-           const PathTracer& tracer,
-           const LitPointOptions& options)
-      : world_(world),
-        tracer_(tracer),
-        eta_(translucency.model->Eta()),
-        indirect_(translucency.indirect && options.indirect),
-        // The samples asked for are a patch's; its points share them.
-        samples_(std::max(
-            1,
-            static_cast<int>(std::lround(translucency.irradiance_samples /
-                                         std::max(1.0, options.points_per_patch))))) {}
+  Placement(const Shape& shape, const SeenPlaces* seen, float patch)
+      : shape_(shape), seen_(seen), dense_(kDensePatches * patch) {}
 
-  Color Entering(const SurfaceHit& hit,
-                 std::uint64_t seed,
-                 PathCounters& counters) const {
-    Color sum;
-    for (std::size_t light = 0; light < world_.light_count(); ++light) {
-      const int samples = world_.IsDeltaLight(light) ? 1 : samples_;
-      const std::uint64_t light_seed = MixSeed(seed, light);
-      Color from_light;
-      for (int k = 0; k < samples; ++k) {
-        Sampler sampler(light_seed, static_cast<std::uint32_t>(k));
-        from_light += Direct(hit, light, sampler.Next2D(), counters);
-      }
-      sum += from_light / static_cast<float>(samples);
+  std::vector<Place> Spread(double count) {
+    if (const auto* mesh = std::get_if<TriangleMesh>(&shape_.geometry)) {
+      SpreadOverMesh(*mesh, count);
+    } else {
+      SpreadInPlace(0, static_cast<std::int64_t>(std::ceil(count)));
     }
-    if (indirect_) {
-      const std::uint64_t indirect_seed = MixSeed(seed, world_.light_count());
-      Color indirect;
-      for (int k = 0; k < samples_; ++k) {
-        Sampler sampler(indirect_seed, static_cast<std::uint32_t>(k));
-        indirect += Indirect(hit, sampler, counters);
-      }
-      sum += indirect / static_cast<float>(samples_);
+    if (places_.empty()) {  // a surface smaller than half a patch
+      places_.push_back({0, 0, 0});
     }
-    return sum;
+    return std::move(places_);
   }
+
+  std::int64_t full_count() const { return full_count_; }
 
  private:
-  Color Direct(const SurfaceHit& hit,
-               std::size_t light,
-               Vec2 u,
-               PathCounters& counters) const {
-    const LightSample sample = world_.SampleLight(light, hit.position, hit.normal, u);
-    const float cosine = std::min(1.0F, Dot(hit.normal, sample.wi));
-    if (!(sample.pdf > 0) || cosine <= 0 || Dot(hit.face_normal, sample.wi) <= 0) {
-      return {};
+  // Triangle after triangle, as many points as its area deserves; remainders carry
+  // over, so that each stretch of the surface is off by less than one point.
+  void SpreadOverMesh(const TriangleMesh& mesh, double count) {
+    const double per_area = count / SurfaceArea(mesh);
+    std::array<double, kLevels> due;
+    due.fill(0.5);
+    double full_due = 0.5;
+    for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+      const auto triangle = static_cast<std::uint32_t>(i);
+      const double wanted = per_area * static_cast<double>(mesh.TriangleArea(i));
+      full_due += wanted;
+      const auto whole = static_cast<std::int64_t>(full_due);
+      full_due -= static_cast<double>(whole);
+      if (seen_ != nullptr && whole > kLargeTriangle) {
+        SpreadInPlace(triangle, whole);
+        continue;
+      }
+      const auto& t = mesh.triangles[i];
+      const int level = LevelAt(
+          (mesh.positions[t[0]] + mesh.positions[t[1]] + mesh.positions[t[2]]) / 3);
+      double& at_level = due[static_cast<std::size_t>(level)];
+      at_level += std::ldexp(wanted, -2 * level);
+      const double points = std::floor(at_level);
+      at_level -= points;
+      full_count_ += whole;
+      for (double k = 0; k < points; ++k) {
+        places_.push_back({triangle, next_++, static_cast<std::uint8_t>(level)});
+      }
     }
-    ++counters.shadow_rays;
-    if (world_.geometry().Occluded(ShadowRay(hit, sample))) {
-      return {};
-    }
-    return sample.radiance * (cosine * (1 - FresnelDielectric(cosine, eta_)));
   }
 
-  // With density cos θ / π, so that the estimate of ∫ L F_t cos θ dω is π L F_t.
-  Color Indirect(const SurfaceHit& hit,
-                 Sampler& sampler,
-                 PathCounters& counters) const {
-    const Vec3 local = SquareToCosineHemisphere(sampler.Next2D());
-    const Vec3 wi = Frame(hit.normal).ToWorld(local);
-    if (Dot(hit.face_normal, wi) <= 0) {
-      return {};
+  // Many points, each at its own level: a prefix of the sequence is as even as all of
+  // it.
+  void SpreadInPlace(std::uint32_t triangle, std::int64_t count) {
+    full_count_ += count;
+    for (std::int64_t k = 0; k < count; ++k) {
+      const auto index = static_cast<std::uint32_t>(k);
+      const int level =
+          seen_ == nullptr ? 0 : LevelAt(PlacePoint(shape_, triangle, index).position);
+      if (k << (2 * level) < count) {
+        places_.push_back({triangle, index, static_cast<std::uint8_t>(level)});
+      }
     }
-    const Color radiance =
-        tracer_.IndirectRadiance({OffsetOrigin(hit, wi), wi}, sampler, counters);
-    return radiance * (kPi * (1 - FresnelDielectric(std::min(1.0F, local.z), eta_)));
   }
 
-  const World& world_;
-  const PathTracer& tracer_;
-  float eta_;
-  bool indirect_;
-  int samples_;
+  int LevelAt(Vec3 position) const {
+    if (seen_ == nullptr) {
+      return 0;
+    }
+    float limit = 2 * dense_;
+    const float distance = seen_->DistanceTo(position);
+    int level = 0;
+    while (level + 1 < kLevels && distance >= limit) {
+      ++level;
+      limit *= 2;
+    }
+    return level;
+  }
+
+  const Shape& shape_;
+  const SeenPlaces* seen_;
+  float dense_;
+  std::uint32_t next_ = 0;
+  std::int64_t full_count_ = 0;
+  std::vector<Place> places_;
 };
 
 }  // namespace
@@ -140,45 +131,56 @@ LitPoints SampleLitPoints(const World& world,
                           const LitPointOptions& options) {
   const Shape& shape = world.scene().shapes[shape_index];
   const Translucency& translucency = *shape.translucency;
-  const double mm = static_cast<double>(translucency.mm_per_unit);
-  const double patch_mm = static_cast<double>(translucency.model->PatchSizeMm());
-  const double area_mm2 = AreaSampler(shape).area() * mm * mm;
+  const float patch_mm = translucency.model->PatchSizeMm();
+  const double patch_area_mm2 = std::pow(static_cast<double>(patch_mm), 2);
+  const double area_mm2 = AreaSampler(shape).area() *
+                          std::pow(static_cast<double>(translucency.mm_per_unit), 2);
 
   LitPoints result;
   const double wanted =
-      std::max(1.0, options.points_per_patch * area_mm2 / (patch_mm * patch_mm));
+      std::max(1.0, options.points_per_patch * area_mm2 / patch_area_mm2);
   result.capped = wanted > static_cast<double>(options.max_points);
   const double count = std::min(wanted, static_cast<double>(options.max_points));
-  Placement placement;
-  if (const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
-    placement = PlaceOnMesh(*mesh, count);
-  } else {
-    placement.count = static_cast<std::int64_t>(std::ceil(count));
-  }
+  Placement placement(shape, options.seen, patch_mm / translucency.mm_per_unit);
+  const std::vector<Place> places = placement.Spread(count);
+  const auto place_count = std::ssize(places);
+  result.skipped = std::max<std::int64_t>(0, placement.full_count() - place_count);
   result.area_mm2 = area_mm2;
+  double parts = 0;
+  for (const Place& place : places) {
+    parts += std::ldexp(1.0, 2 * place.level);
+  }
 
-  const Gatherer gatherer(world, translucency, tracer, options);
+  const EnteringLight light(world,
+                            tracer,
+                            translucency.model->Eta(),
+                            translucency.indirect && options.indirect);
+  // The samples asked for are a patch's; its points share them.
+  const int samples =
+      std::max(1,
+               static_cast<int>(std::lround(translucency.irradiance_samples /
+                                            std::max(1.0, options.points_per_patch))));
   const std::uint64_t seed = MixSeed(options.seed, shape_index);
-  const float area_each =
-      static_cast<float>(area_mm2 / static_cast<double>(placement.count));
-  result.points.resize(static_cast<std::size_t>(placement.count));
+  result.points.resize(places.size());
   std::vector<PathCounters> counters(
-      static_cast<std::size_t>((placement.count + kBlock - 1) / kBlock));
-  ParallelForBlocks(placement.count,
-                    kBlock,
-                    options.thread_count,
-                    [&](std::int64_t begin, std::int64_t end) {
-                      PathCounters& block =
-                          counters[static_cast<std::size_t>(begin / kBlock)];
-                      for (std::int64_t i = begin; i < end; ++i) {
-                        const SurfaceHit hit = PlacePoint(shape, placement, i);
-                        LitPoint& lit = result.points[static_cast<std::size_t>(i)];
-                        lit.point = ToSurfacePoint(hit, translucency.mm_per_unit);
-                        lit.area_mm2 = area_each;
-                        lit.flux_density = gatherer.Entering(
-                            hit, MixSeed(seed, static_cast<std::uint64_t>(i)), block);
-                      }
-                    });
+      static_cast<std::size_t>((place_count + kBlock - 1) / kBlock));
+  ParallelForBlocks(
+      place_count,
+      kBlock,
+      options.thread_count,
+      [&](std::int64_t begin, std::int64_t end) {
+        PathCounters& block = counters[static_cast<std::size_t>(begin / kBlock)];
+        for (std::int64_t i = begin; i < end; ++i) {
+          const Place& place = places[static_cast<std::size_t>(i)];
+          const SurfaceHit hit = PlacePoint(shape, place.triangle, place.index);
+          LitPoint& lit = result.points[static_cast<std::size_t>(i)];
+          lit.point = ToSurfacePoint(hit, translucency.mm_per_unit);
+          lit.area_mm2 =
+              static_cast<float>(std::ldexp(area_mm2 / parts, 2 * place.level));
+          lit.flux_density = light.AllLights(
+              hit, samples, MixSeed(seed, static_cast<std::uint64_t>(i)), block);
+        }
+      });
   for (const PathCounters& block : counters) {
     result.counters += block;
   }

@@ -32,6 +32,13 @@ std::vector<std::filesystem::path> PresetFolders(
   } else if (!home.empty()) {
     folders.push_back(std::filesystem::path(home) / ".local/share/nacre/presets");
   }
+  std::error_code unknown;  // then the installed ones remain
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", unknown);
+  if (!unknown) {  // a build folder, or one that was moved
+    const std::filesystem::path bin = program.parent_path();
+    folders.push_back(bin / "share/nacre/presets");
+    folders.push_back(bin.parent_path() / "share/nacre/presets");
+  }
   folders.push_back(std::filesystem::path(NACRE_DATA_DIR) / "presets");
   return folders;
 }
@@ -43,7 +50,8 @@ std::filesystem::path FindPreset(const std::string& name,
   }
   std::string looked;
   for (const std::filesystem::path& folder : PresetFolders(scene_folder)) {
-    for (const std::string& file : {name, name + ".nacre.exr"}) {
+    for (const std::string& file :
+         {name, name + ".nacre.exr", name + "/material.nacre.exr"}) {
       const std::filesystem::path path = folder / file;
       std::error_code none;
       if (std::filesystem::is_regular_file(path, none)) {
@@ -52,12 +60,12 @@ std::filesystem::path FindPreset(const std::string& name,
     }
     looked += fmt::format("\n  {}", folder.string().empty() ? "." : folder.string());
   }
-  throw BadData(
-      fmt::format("no material '{}': neither that file nor '{}.nacre.exr' is "
-                  "in any of{}\nset NACRE_PRESET_PATH to the folder it is in",
-                  name,
-                  name,
-                  looked));
+  throw BadData(fmt::format(
+      "no material '{}': neither that file, nor '{}.nacre.exr', nor a "
+      "preset's folder is in any of{}\nset NACRE_PRESET_PATH to the folder it is in",
+      name,
+      name,
+      looked));
 }
 
 }  // namespace nacre::render

@@ -3,9 +3,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "render/accumulator.h"
-#include "render/exitance_field.h"
+#include "render/exitances.h"
 #include "render/integrators/path.h"
-#include "render/lit_points.h"
 #include "render/stopwatch.h"
 #include "render/world.h"
 
@@ -19,63 +18,15 @@ namespace {
 
 IntegratorSettings ChooseIntegrator(const Scene& scene, const std::string& name) {
   IntegratorSettings settings = scene.integrator;
-  if (name == "path" || name == "fast") {
+  if (name == "path" || name == "fast" || name == "reference") {
     settings.kind = IntegratorSettings::Kind::kPath;
   } else if (name == "direct") {
     settings.kind = IntegratorSettings::Kind::kDirect;
   } else if (name != "scene") {
     throw UsageError("no integrator '" + name +
-                     "': there are scene, path, direct and fast");
+                     "': there are scene, path, direct, fast and reference");
   }
   return settings;
-}
-
-using Exitances = std::vector<std::unique_ptr<ExitanceField>>;
-
-// Lets light into every translucent shape.
-Exitances IlluminateShapes(const World& world,
-                           const IntegratorSettings& settings,
-                           const RenderOptions& options,
-                           const ProgressFunction& progress,
-                           RenderSummary& summary) {
-  const auto& shapes = world.scene().shapes;
-  Exitances dark(shapes.size());
-  Exitances lit(shapes.size());
-  const PathTracer tracer(world, dark, settings);
-  const std::int64_t total =
-      std::count_if(shapes.begin(), shapes.end(), [](const Shape& shape) {
-        return shape.translucency.has_value();
-      });
-  std::int64_t done = 0;
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    if (!shapes[i].translucency) {
-      continue;
-    }
-    Report(progress, {"light", done++, total, shapes[i].translucency->name});
-    const Stopwatch irradiance_time;
-    LitPoints points = SampleLitPoints(
-        world,
-        static_cast<std::uint32_t>(i),
-        tracer,
-        {.points_per_patch = options.points_per_patch,
-         .max_points = static_cast<std::int64_t>(options.max_lit_points),
-         .seed = options.seed,
-         .thread_count = options.thread_count,
-         .indirect = settings.kind == IntegratorSettings::Kind::kPath});
-    summary.irradiance_s += irradiance_time.Seconds();
-    summary.lit_points += static_cast<std::int64_t>(points.points.size());
-    summary.lit_points_capped = summary.lit_points_capped || points.capped;
-    summary.rays += points.counters.rays;
-    summary.shadow_rays += points.counters.shadow_rays;
-    const Stopwatch model_time;
-    const SubsurfaceModel& model = *shapes[i].translucency->model;
-    lit[i] = std::make_unique<ExitanceField>(
-        shapes[i],
-        model.Illuminate(std::move(points.points), options.thread_count),
-        static_cast<float>(options.exitance_spacing) * model.PatchSizeMm());
-    summary.models_s += model_time.Seconds();
-  }
-  return lit;
 }
 
 constexpr int kTile = 16;
@@ -113,6 +64,9 @@ class Pass {
       summary.shadow_rays += tile.paths.shadow_rays;
       summary.exitances += tile.paths.exitances;
       summary.evaluations += tile.paths.evaluations;
+      summary.pairs += tile.paths.pairs;
+      summary.probes += tile.paths.probes;
+      summary.probes_cut += tile.paths.probes_cut;
       summary.bad_samples += tile.bad;
       summary.clamped_samples += tile.clamped;
     }
@@ -251,10 +205,9 @@ Rendering Render(const Scene& scene,
   const World world(scene, options.thread_count);
   summary.build_s = total.Seconds();
   DescribeScene(scene, world, summary);
-  const Exitances exitances =
-      IlluminateShapes(world, settings, options, progress, summary);
+  const Exitances exitances(world, settings, options, progress, summary);
 
-  const PathTracer tracer(world, exitances, settings);
+  const PathTracer tracer(world, exitances.sources(), settings);
   Accumulator film(scene.film);
   Pass pass(scene, tracer, options, film);
   PassSchedule schedule(options, total.Seconds());
@@ -290,6 +243,7 @@ Rendering Render(const Scene& scene,
   summary.samples_per_pixel = done;
   summary.relative_error = film.RelativeError(done);
   summary.paths_s = schedule.Seconds();
+  exitances.AddUse(summary.use);
   summary.cpu_s = cpu.Seconds();
   rendering.image = film.ToImage(done);
   return rendering;

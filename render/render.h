@@ -24,6 +24,7 @@ struct RenderOptions {
   double points_per_patch = 16;
   double max_lit_points = 2e6;
   double exitance_spacing = 2;
+  bool lazy = true;
   double snapshot_s = 0;
 
   template <class Self, class Visitor>
@@ -32,8 +33,9 @@ struct RenderOptions {
     visit("integrator",
           self.integrator,
           Range{},
-          "scene (what the file says), path, direct, or fast: path tracing with "
-          "translucency by R_d");
+          "scene (what the file says), path, direct, fast: path tracing with "
+          "translucency gathered from lit points; reference: the same without bias, "
+          "every sample looking for light of its own");
     visit("time_limit",
           self.time_limit_s,
           Range{0, 1e9},
@@ -60,6 +62,10 @@ struct RenderOptions {
           Range{0, 64},
           "distance in patches of the points where a translucent surface's exitance is "
           "evaluated, with interpolation between; 0: at every hit");
+    visit("lazy",
+          self.lazy,
+          Range{},
+          "find light closely only near what the picture shows");
     visit("snapshot",
           self.snapshot_s,
           Range{0, 1e9},
@@ -78,15 +84,21 @@ struct RenderSummary {
   std::int64_t triangles = 0;
   std::int64_t lights = 0;
   std::int64_t lit_points = 0;
-  bool lit_points_capped = false;  ///< max_lit_points was too few
+  std::int64_t lit_points_skipped = 0;  ///< far from what is seen
+  bool lit_points_capped = false;       ///< max_lit_points was too few
   std::int64_t rays = 0;
   std::int64_t shadow_rays = 0;
   std::int64_t exitances = 0;    ///< hits of translucent surfaces
   std::int64_t evaluations = 0;  ///< questions to their models; about, since threads
                                  ///< may ask the same at once
+  std::int64_t pairs = 0;        ///< sources, patches or clusters, that these asked
+  std::int64_t probes = 0;       ///< lines that looked for places of entry (reference)
+  std::int64_t probes_cut = 0;   ///< of them, stopped after too many surfaces
+  ModelUse use;                  ///< of measured materials, all together
   std::int64_t bad_samples = 0;  ///< NaN or infinite: left out
   std::int64_t clamped_samples = 0;
   double build_s = 0;       ///< the ray tracer's tree
+  double seen_s = 0;        ///< finding what the camera sees
   double irradiance_s = 0;  ///< light entering translucent objects
   double models_s = 0;      ///< preparing their models
   double paths_s = 0;

@@ -11,7 +11,7 @@ std::string RenderSummary::Brief() const {
       width,
       height,
       samples_per_pixel,
-      build_s + irradiance_s + models_s + paths_s,
+      build_s + seen_s + irradiance_s + models_s + paths_s,
       thread_count_used,
       cpu_s);
   if (time_ran_out) {
@@ -31,14 +31,21 @@ std::string RenderSummary::Table() const {
       "triangles        {:>12}\n"
       "lights           {:>12}\n"
       "lit points       {:>12}{}\n"
+      "  skipped        {:>12}\n"
       "rays             {:>12}\n"
       "shadow rays      {:>12}\n"
       "exitances        {:>12}\n"
       "evaluations      {:>12}\n"
+      "pairs            {:>12}\n"
+      "windows          {:>12} of {}\n"
+      "tiles            {:>12} of {}\n"
+      "channels read    {:>12}\n"
+      "probes           {:>12}{}\n"
       "relative error   {:>12.4f}\n"
       "bad samples      {:>12}\n"
       "clamped samples  {:>12}\n"
       "tree             {:>10.2f} s\n"
+      "seen             {:>10.2f} s\n"
       "irradiance       {:>10.2f} s\n"
       "models           {:>10.2f} s\n"
       "paths            {:>10.2f} s\n"
@@ -47,14 +54,24 @@ std::string RenderSummary::Table() const {
       lights,
       lit_points,
       lit_points_capped ? " (capped)" : "",
+      lit_points_skipped,
       rays,
       shadow_rays,
       exitances,
       evaluations,
+      pairs,
+      use.windows,
+      use.windows_total,
+      use.tiles,
+      use.tiles_total,
+      use.channels,
+      probes,
+      probes_cut > 0 ? fmt::format(" ({} cut short)", probes_cut) : "",
       relative_error,
       bad_samples,
       clamped_samples,
       build_s,
+      seen_s,
       irradiance_s,
       models_s,
       paths_s,
@@ -71,15 +88,25 @@ Json RenderSummary::ToJson() const {
           {"triangles", triangles},
           {"lights", lights},
           {"lit_points", lit_points},
+          {"lit_points_skipped", lit_points_skipped},
           {"lit_points_capped", lit_points_capped},
           {"rays", rays},
           {"shadow_rays", shadow_rays},
           {"exitances", exitances},
           {"evaluations", evaluations},
+          {"pairs", pairs},
+          {"probes", probes},
+          {"probes_cut", probes_cut},
+          {"windows", use.windows},
+          {"windows_total", use.windows_total},
+          {"tiles", use.tiles},
+          {"tiles_total", use.tiles_total},
+          {"channels_read", use.channels},
           {"bad_samples", bad_samples},
           {"clamped_samples", clamped_samples},
           {"seconds",
            {{"build", build_s},
+            {"seen", seen_s},
             {"irradiance", irradiance_s},
             {"models", models_s},
             {"paths", paths_s}}},

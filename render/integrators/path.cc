@@ -9,6 +9,9 @@
 namespace nacre::render {
 namespace {
 
+// What a lobe of less than a tenth of a steradian shows can be made out.
+constexpr float kSharpPdf = 10;
+
 float PowerHeuristic(float pdf, float other) {
   const float a = pdf * pdf;
   return a / (a + other * other);
@@ -19,14 +22,6 @@ bool IsBlack(Color c) {
 }
 
 }  // namespace
-
-PathCounters& PathCounters::operator+=(const PathCounters& other) {
-  rays += other.rays;
-  shadow_rays += other.shadow_rays;
-  exitances += other.exitances;
-  evaluations += other.evaluations;
-  return *this;
-}
 
 struct PathTracer::State {
   Ray ray;
@@ -42,13 +37,14 @@ struct PathTracer::State {
   // How the ray was chosen, for what it may find at its end.
   bool count_emission = true;
   bool delta = true;  ///< nothing else could have found it
+  bool sharp = true;  ///< since the camera, nothing but mirrors and the like
   float pdf = 0;
   Vec3 origin{};
   Vec3 side{};
 };
 
 PathTracer::PathTracer(const World& world,
-                       const std::vector<std::unique_ptr<ExitanceField>>& exitances,
+                       const ExitanceSources& exitances,
                        const IntegratorSettings& settings)
     : world_(world), exitances_(exitances), settings_(settings) {
   for (const Shape& shape : world.scene().shapes) {
@@ -81,7 +77,8 @@ Color PathTracer::IndirectRadiance(const Ray& ray,
               .counters = counters,
               .depth = 2,
               .max_depth = settings_.max_depth,
-              .count_emission = false};
+              .count_emission = false,
+              .sharp = false};
   Trace(state);
   return state.radiance;
 }
@@ -183,6 +180,7 @@ bool PathTracer::Continue(State& state,
     state.throughput *= 1 / survive;
   }
   state.delta = sample.delta;
+  state.sharp = state.sharp && (sample.delta || sample.pdf > kSharpPdf);
   state.pdf = sample.pdf;
   state.origin = hit.position;
   state.side = wo.z > 0 ? hit.normal : -hit.normal;
@@ -199,7 +197,8 @@ Color PathTracer::TranslucentRadiance(State& state,
   const float cosine = std::min(1.0F, std::abs(Dot(hit.normal, to_viewer)));
   const float transmitted =
       1 - FresnelDielectric(cosine, hit.shape->translucency->model->Eta());
-  return exitances_[hit.shape_index]->At(hit, state.counters.evaluations) *
+  return exitances_[hit.shape_index]->At(hit,
+                                         {state.sampler, state.counters, state.sharp}) *
          (transmitted * exit_scale_[hit.shape_index]);
 }
 

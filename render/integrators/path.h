@@ -1,31 +1,20 @@
 #pragma once
 
-#include "render/exitance_field.h"
+#include "render/exitance_source.h"
 #include "render/sampler.h"
 #include "render/world.h"
 
-#include <cstdint>
-#include <memory>
 #include <vector>
 
 namespace nacre::render {
-
-struct PathCounters {
-  std::int64_t rays = 0;
-  std::int64_t shadow_rays = 0;
-  std::int64_t exitances = 0;    ///< hits of translucent surfaces
-  std::int64_t evaluations = 0;  ///< questions to models of translucency
-
-  PathCounters& operator+=(const PathCounters& other);
-};
 
 /// A path tracer with light sampling, BSDF sampling and their combination by the power
 /// heuristic [Veach97, section 9.2.4].
 class PathTracer {
  public:
-  /// All references must outlive it. `exitances`: one a shape, null where opaque.
+  /// All references must outlive it.
   PathTracer(const World& world,
-             const std::vector<std::unique_ptr<ExitanceField>>& exitances,
+             const ExitanceSources& exitances,
              const IntegratorSettings& settings);
 
   struct Result {
@@ -53,7 +42,7 @@ class PathTracer {
   Color TranslucentRadiance(State& state, const SurfaceHit& hit, Vec3 to_viewer) const;
 
   const World& world_;
-  const std::vector<std::unique_ptr<ExitanceField>>& exitances_;
+  const ExitanceSources& exitances_;
   IntegratorSettings settings_;
   std::vector<float> exit_scale_;  ///< 1 / (π c(η)) a shape
 };

@@ -2,8 +2,11 @@
 #include "render/jensen_media.h"
 #include "render/preset_path.h"
 #include "render/scene_reader/objects.h"
+#include "render/subsurface/analytic_profiles.h"
 #include "render/subsurface/models.h"
+#include "render/subsurface/radial_model.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace nacre::render {
@@ -68,20 +71,65 @@ DipoleParameters ReadMedium(Element& element) {
   return p;
 }
 
-std::shared_ptr<const SubsurfaceModel> ReadFactored(Element& element,
-                                                    Translucency& translucency) {
-  translucency.name = element.String("material", "");
-  if (translucency.name.empty()) {
-    element.Fail("svd needs a <string name=\"material\">: a preset or a *.nacre.exr");
+Medium MediumOf(const DipoleParameters& p, int channel) {
+  return {static_cast<double>(p.sigma_a_per_mm[channel]),
+          static_cast<double>(p.sigma_s_prime_per_mm[channel]),
+          static_cast<double>(p.eta)};
+}
+
+// Of a reflectance and a mean free path, as artists know them.
+std::shared_ptr<const SubsurfaceModel> ReadNormalizedDiffusion(Element& element) {
+  const Color albedo = element.Spectrum("reflectance", {0.5F, 0.5F, 0.5F});
+  const Color mean_free_path = element.Spectrum("meanFreePath", {1, 1, 1});
+  const auto profile = [&](int c) {
+    return MakeNormalizedDiffusion(static_cast<double>(albedo[c]),
+                                   static_cast<double>(mean_free_path[c]));
+  };
+  const double inside =
+      element.Has("intIOR") ? element.RefractiveIndex("intIOR", "water") : 1.5;
+  const double eta = inside / element.RefractiveIndex("extIOR", "vacuum");
+  return MakeRadial({profile(0), profile(1), profile(2)}, static_cast<float>(eta));
+}
+
+std::shared_ptr<const SubsurfaceModel> ReadAnalytic(Element& element,
+                                                    const std::string& type) {
+  if (type == "normalizeddiffusion") {
+    return ReadNormalizedDiffusion(element);
   }
-  Document& document = element.document();
-  std::filesystem::path path;
+  const DipoleParameters p = ReadMedium(element);
+  if (type == "dipole") {
+    return MakeDipole(p);
+  }
+  const bool slab = type == "multipole";
+  const double thickness_mm = slab ? element.Float("thickness", 1) : 0;
+  const auto profile = [&](int c) {
+    return slab ? MakeMultipole(MediumOf(p, c), thickness_mm)
+                : MakeBetterDipole(MediumOf(p, c));
+  };
+  return MakeRadial({profile(0), profile(1), profile(2)}, p.eta);
+}
+
+std::filesystem::path FindMaterial(Element& element, const std::string& name) {
   try {
-    path = FindPreset(translucency.name, document.folder);
+    return FindPreset(name, element.document().folder);
   } catch (const Error& e) {
     element.FailAt("material", e.what());
   }
-  document.scene.files.push_back(path);
+}
+
+std::shared_ptr<const SubsurfaceModel> ReadMeasured(Element& element,
+                                                    Translucency& translucency) {
+  translucency.name = element.String("material", "");
+  if (translucency.name.empty()) {
+    element.Fail(
+        "svd needs a <string name=\"material\">: a preset, a *.nacre.exr or a "
+        "*.rd.exr");
+  }
+  const std::filesystem::path path = FindMaterial(element, translucency.name);
+  element.document().scene.files.push_back(path);
+  if (path.string().ends_with(".rd.exr")) {
+    return MakeMeasured(OpenDatasetSource(path));
+  }
   return MakeFactored(
       std::make_shared<const factor::Material>(factor::ReadMaterial(path)));
 }
@@ -92,20 +140,26 @@ Translucency ReadSubsurface(Element element) {
   Translucency translucency;
   const std::string type = element.type();
   ReadCommon(element, translucency);
-  if (type == "dipole") {
-    translucency.name = element.String("material", "dipole");
-    const DipoleParameters parameters = ReadMedium(element);
+  const std::vector<std::string> analytic = {
+      "dipole", "betterdipole", "multipole", "normalizeddiffusion"};
+  if (type == "svd") {
+    translucency.model = ReadMeasured(element, translucency);
+  } else if (std::find(analytic.begin(), analytic.end(), type) != analytic.end()) {
+    translucency.name = element.String("material", type);
     try {
-      translucency.model = MakeDipole(parameters);
+      translucency.model = ReadAnalytic(element, type);
     } catch (const Error& e) {
-      element.Fail(e.what());
+      // What the reader found has its line already; what the model found, not yet.
+      if (e.code() == ExitCode::kUsage) {
+        element.Fail(e.what());
+      }
+      throw;
     }
-  } else if (type == "svd") {
-    translucency.model = ReadFactored(element, translucency);
   } else {
     // Even a lenient reader can't guess a material.
-    element.Fail(
-        fmt::format("no subsurface '{}'{}", type, Suggestion(type, {"dipole", "svd"})));
+    std::vector<std::string> known = analytic;
+    known.emplace_back("svd");
+    element.Fail(fmt::format("no subsurface '{}'{}", type, Suggestion(type, known)));
   }
   element.Finish();
   return translucency;

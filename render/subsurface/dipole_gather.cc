@@ -1,8 +1,9 @@
 #include "core/error.h"
 #include "core/fresnel.h"
+#include "render/subsurface/dipole_profile.h"
 #include "render/subsurface/dipole_table.h"
-#include "render/subsurface/models.h"
 #include "render/subsurface/patch_tree.h"
+#include "render/subsurface/radial_model.h"
 
 #include <algorithm>
 #include <array>
@@ -16,7 +17,7 @@ namespace {
 
 class DipoleGather final : public Subsurface {
  public:
-  DipoleGather(const std::array<DipoleProfile, 3>& profiles,
+  DipoleGather(const ProfileTriple& profiles,
                std::vector<Patch> patches,
                double max_relative_extent,
                int thread_count)
@@ -31,22 +32,26 @@ class DipoleGather final : public Subsurface {
     }
   }
 
-  Color Exitance(const SurfacePoint& x_o) const override {
+  Color Gather(const SurfacePoint& x_o, std::int64_t& pairs) const override {
     ColorLanes sum;
+    std::int64_t asked = 0;
     tree_.Visit(
         x_o.position_mm,
         max_relative_extent_,
         table_.reach_mm(),
         [&](std::int32_t node, Vec3 d_mm) {
           const Source& source = nodes_[static_cast<std::size_t>(node)];
+          ++asked;
           table_.AddFar(
               DistanceOf(d_mm, source), source.extent_mm2, source.flux_w, sum);
         },
         [&](std::int32_t patch, Vec3 d_mm) {
           const Source& source = patches_[static_cast<std::size_t>(patch)];
+          ++asked;
           table_.AddDisc(
               DistanceOf(d_mm, source), source.extent_mm2, source.flux_w, sum);
         });
+    pairs += asked;
     return {sum.v[0], sum.v[1], sum.v[2]};
   }
 
@@ -82,7 +87,7 @@ class DipoleGather final : public Subsurface {
 
 class Dipole final : public SubsurfaceModel {
  public:
-  Dipole(const std::array<DipoleProfile, 3>& profiles,
+  Dipole(const ProfileTriple& profiles,
          float eta,
          float patch_mm,
          const DipoleOptions& options)
@@ -90,6 +95,26 @@ class Dipole final : public SubsurfaceModel {
 
   float Eta() const override { return eta_; }
   float PatchSizeMm() const override { return patch_mm_; }
+  Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const override {
+    const auto r = static_cast<double>(Length(x_o.position_mm - x_i.position_mm));
+    return {static_cast<float>(profiles_[0]->Rd(r)),
+            static_cast<float>(profiles_[1]->Rd(r)),
+            static_cast<float>(profiles_[2]->Rd(r))};
+  }
+  RadialDensity Spread() const override {
+    double finest = std::numeric_limits<double>::infinity();
+    double reach = 0;
+    for (const auto& p : profiles_) {
+      finest = std::min(finest, p->MeanFreePathMm() / 64);
+      reach = std::max(reach, ReachMm(*p));
+    }
+    return RadialDensity(
+        [&](double r) {
+          return profiles_[0]->Rd(r) + profiles_[1]->Rd(r) + profiles_[2]->Rd(r);
+        },
+        finest,
+        reach);
+  }
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int thread_count) const override {
     return std::make_unique<DipoleGather>(profiles_,
@@ -99,7 +124,7 @@ class Dipole final : public SubsurfaceModel {
   }
 
  private:
-  std::array<DipoleProfile, 3> profiles_;
+  ProfileTriple profiles_;
   float eta_;
   float patch_mm_;
   DipoleOptions options_;
@@ -107,27 +132,20 @@ class Dipole final : public SubsurfaceModel {
 
 }  // namespace
 
-std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parameters,
+std::shared_ptr<const SubsurfaceModel> MakeRadial(const ProfileTriple& profiles,
+                                                  float eta,
                                                   const DipoleOptions& options) {
   Validate(options);
-  if (!(parameters.eta >= 1 && std::isfinite(parameters.eta))) {
+  if (!(eta >= 1 && std::isfinite(eta))) {
     throw UsageError(
         fmt::format("a dipole with refractive index {}: at least 1 is "
                     "needed (inside relative to outside)",
-                    parameters.eta));
+                    eta));
   }
-  const double internal_reflectance =
-      DiffuseFresnelReflectance(1 / static_cast<double>(parameters.eta));
-  const auto profile = [&](int c) {
-    return DipoleProfile(static_cast<double>(parameters.sigma_a_per_mm[c]),
-                         static_cast<double>(parameters.sigma_s_prime_per_mm[c]),
-                         internal_reflectance);
-  };
-  const std::array<DipoleProfile, 3> profiles{profile(0), profile(1), profile(2)};
   double mean_free_path_mm = std::numeric_limits<double>::infinity();
-  for (const DipoleProfile& p : profiles) {
-    if (p.Total() > 0) {
-      mean_free_path_mm = std::min(mean_free_path_mm, p.MeanFreePathMm());
+  for (const auto& p : profiles) {
+    if (p->Total() > 0) {
+      mean_free_path_mm = std::min(mean_free_path_mm, p->MeanFreePathMm());
     }
   }
   if (!std::isfinite(mean_free_path_mm)) {
@@ -135,9 +153,24 @@ std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parame
   }
   return std::make_shared<Dipole>(
       profiles,
-      parameters.eta,
+      eta,
       static_cast<float>(options.patch_mean_free_paths * mean_free_path_mm),
       options);
+}
+
+std::shared_ptr<const SubsurfaceModel> MakeDipole(const DipoleParameters& parameters,
+                                                  const DipoleOptions& options) {
+  const double internal_reflectance =
+      parameters.eta >= 1 && std::isfinite(parameters.eta)  // else refused below
+          ? DiffuseFresnelReflectance(1 / static_cast<double>(parameters.eta))
+          : 0;
+  const auto profile = [&](int c) {
+    return std::make_shared<DipoleProfile>(
+        static_cast<double>(parameters.sigma_a_per_mm[c]),
+        static_cast<double>(parameters.sigma_s_prime_per_mm[c]),
+        internal_reflectance);
+  };
+  return MakeRadial({profile(0), profile(1), profile(2)}, parameters.eta, options);
 }
 
 }  // namespace nacre::render

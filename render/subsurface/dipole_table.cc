@@ -9,8 +9,8 @@
 namespace nacre::render {
 namespace {
 
-/// Rows of the near table: squared radii 0, 1/6, … 1 of the largest.
-constexpr std::uint32_t kDiscs = 7;
+/// The smallest disc of the near table, of the largest.
+constexpr double kSmallestDisc = 1.0 / 16;
 
 /// From this many radii on, a disc is a point with a second moment.
 constexpr double kFarRadii = 4;
@@ -23,21 +23,22 @@ constexpr double kFlatMeanFreePaths = 1.0 / 64;
 constexpr double kEndMeanFreePaths = 2e4;
 constexpr double kEndDecay = 25;
 
-double SmallestMeanFreePath(const std::array<DipoleProfile, 3>& profiles) {
-  return std::min({profiles[0].MeanFreePathMm(),
-                   profiles[1].MeanFreePathMm(),
-                   profiles[2].MeanFreePathMm()});
+double SmallestMeanFreePath(const ProfileTriple& profiles) {
+  return std::min({profiles[0]->MeanFreePathMm(),
+                   profiles[1]->MeanFreePathMm(),
+                   profiles[2]->MeanFreePathMm()});
 }
 
-double Reach(const DipoleProfile& profile) {
+}  // namespace
+
+double ReachMm(const RadialProfile& profile) {
   const double end = kEndMeanFreePaths * profile.MeanFreePathMm();
   const double decay = profile.EffectiveTransportPerMm();
   return decay * end > kEndDecay ? kEndDecay / decay : end;
 }
 
-}  // namespace
-
-SquaredDistanceAxis::SquaredDistanceAxis(double r_min_mm, double r_max_mm) {
+template <int kBits>
+OctaveAxis<kBits>::OctaveAxis(double r_min_mm, double r_max_mm) {
   Expect(r_min_mm > 0 && r_max_mm > r_min_mm, "an axis of positive length");
   const auto step_below = [](double r) {
     return std::bit_cast<std::uint32_t>(static_cast<float>(r * r)) & ~kMask;
@@ -50,22 +51,26 @@ SquaredDistanceAxis::SquaredDistanceAxis(double r_min_mm, double r_max_mm) {
   high_ = std::bit_cast<float>(last - 1);
 }
 
-double SquaredDistanceAxis::Distance(std::uint32_t index) const {
+template <int kBits>
+double OctaveAxis<kBits>::Distance(std::uint32_t index) const {
   const auto r2 = std::bit_cast<float>(origin_ + (index << kShift));
   return std::sqrt(static_cast<double>(r2));
 }
 
-DipoleTable::DipoleTable(const std::array<DipoleProfile, 3>& profiles,
+template class OctaveAxis<5>;
+template class OctaveAxis<1>;
+
+DipoleTable::DipoleTable(const ProfileTriple& profiles,
                          double largest_disc_mm,
                          int thread_count) {
   FillFar(profiles);
   FillNear(profiles, largest_disc_mm, thread_count);
 }
 
-void DipoleTable::FillFar(const std::array<DipoleProfile, 3>& profiles) {
+void DipoleTable::FillFar(const ProfileTriple& profiles) {
   double reach = 0;
-  for (const DipoleProfile& profile : profiles) {
-    reach = std::max(reach, Reach(profile));
+  for (const auto& profile : profiles) {
+    reach = std::max(reach, ReachMm(*profile));
   }
   reach_mm_ = static_cast<float>(reach);
   far_axis_ =
@@ -74,31 +79,31 @@ void DipoleTable::FillFar(const std::array<DipoleProfile, 3>& profiles) {
   for (std::uint32_t i = 0; i < far_axis_.size(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       const double r = far_axis_.Distance(i);
-      far_[i].rd.v[c] = static_cast<float>(profiles[c].Rd(r));
-      const DipoleProfile::Spread spread = profiles[c].SpreadTerms(r);
+      far_[i].rd.v[c] = static_cast<float>(profiles[c]->Rd(r));
+      const RadialProfile::Spread spread = profiles[c]->SpreadTerms(r);
       far_[i].slope.v[c] = static_cast<float>(spread.slope);
       far_[i].bend.v[c] = static_cast<float>(spread.bend);
     }
   }
 }
 
-void DipoleTable::FillNear(const std::array<DipoleProfile, 3>& profiles,
+void DipoleTable::FillNear(const ProfileTriple& profiles,
                            double largest_disc_mm,
                            int thread_count) {
   const double flat = kFlatMeanFreePaths * SmallestMeanFreePath(profiles);
   // A margin, so that a disc of exactly the largest radius isn't beyond the last row.
   const double largest = std::max(largest_disc_mm, flat) * 1.001;
   near_axis_ = SquaredDistanceAxis(flat, 1.01 * kFarRadii * largest);
-  discs_per_mm2_ = static_cast<float>((kDiscs - 1) / (largest * largest));
-  near_.resize(std::size_t{kDiscs} * near_axis_.size());
+  disc_axis_ = SquaredRadiusAxis(kSmallestDisc * largest, largest);
+  near_.resize(std::size_t{disc_axis_.size()} * near_axis_.size());
   ParallelFor(near_axis_.size(), thread_count, [&](std::int64_t index) {
     const auto i = static_cast<std::uint32_t>(index);
     const double r = near_axis_.Distance(i);
-    for (std::uint32_t k = 0; k < kDiscs; ++k) {
-      const double disc = largest * std::sqrt(static_cast<double>(k) / (kDiscs - 1));
+    for (std::uint32_t k = 0; k < disc_axis_.size(); ++k) {
+      const double disc = disc_axis_.Distance(k);
       for (std::size_t c = 0; c < 3; ++c) {
         near_[std::size_t{k} * near_axis_.size() + i].v[c] =
-            static_cast<float>(profiles[c].DiscMean(r, disc));
+            static_cast<float>(profiles[c]->DiscMean(r, disc));
       }
     }
   });
@@ -114,14 +119,13 @@ void DipoleTable::AddDisc(const Distance& distance,
     return;
   }
   const auto place = near_axis_.Find(distance.squared_mm2);
-  const float disc = disc2_mm2 * discs_per_mm2_;
-  const std::uint32_t row = std::min(static_cast<std::uint32_t>(disc), kDiscs - 2);
-  const float row_fraction = disc - static_cast<float>(row);
-  const ColorLanes* lower = &near_[std::size_t{row} * near_axis_.size() + place.index];
+  const auto disc = disc_axis_.Find(disc2_mm2);
+  const ColorLanes* lower =
+      &near_[std::size_t{disc.index} * near_axis_.size() + place.index];
   const ColorLanes* upper = lower + near_axis_.size();
   sum += flux * Mix(Mix(lower[0], lower[1], place.fraction),
                     Mix(upper[0], upper[1], place.fraction),
-                    row_fraction);
+                    disc.fraction);
 }
 
 void DipoleTable::AddFar(const Distance& distance,

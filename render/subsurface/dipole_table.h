@@ -1,7 +1,7 @@
 #pragma once
 
 #include "render/subsurface/color_lanes.h"
-#include "render/subsurface/dipole_profile.h"
+#include "render/subsurface/radial_profile.h"
 
 #include <array>
 #include <bit>
@@ -10,12 +10,14 @@
 
 namespace nacre::render {
 
-/// Places on the axis of squared distances: 32 to the octave, taken from the bits of
-/// the float itself, so that finding one takes no logarithm.
-class SquaredDistanceAxis {
+/// Places on an axis of squared lengths, evenly to the octave, taken from the bits of
+/// the float itself, so that finding one takes no logarithm. `kBits`: 2^kBits places to
+/// the octave.
+template <int kBits>
+class OctaveAxis {
  public:
-  SquaredDistanceAxis() = default;
-  SquaredDistanceAxis(double r_min_mm, double r_max_mm);
+  OctaveAxis() = default;
+  OctaveAxis(double r_min_mm, double r_max_mm);
 
   struct Place {
     std::uint32_t index;
@@ -31,7 +33,7 @@ class SquaredDistanceAxis {
   double Distance(std::uint32_t index) const;
 
  private:
-  static constexpr int kShift = 23 - 5;
+  static constexpr int kShift = 23 - kBits;
   static constexpr std::uint32_t kMask = (1u << kShift) - 1;
   static constexpr float kStep = 1.0F / static_cast<float>(1u << kShift);
   std::uint32_t origin_ = 0;
@@ -40,14 +42,18 @@ class SquaredDistanceAxis {
   float high_ = 0;
 };
 
+using SquaredDistanceAxis = OctaveAxis<5>;
+using SquaredRadiusAxis = OctaveAxis<1>;
+
+/// Beyond this distance nothing of a profile is left that counts.
+double ReachMm(const RadialProfile& profile);
+
 /// R_d of three channels, tabulated over squared distance for sources of finite extent.
 /// Good to about 0.05 %.
 class DipoleTable {
  public:
-  /// For discs up to `largest_disc_mm` in radius.
-  DipoleTable(const std::array<DipoleProfile, 3>& profiles,
-              double largest_disc_mm,
-              int thread_count);
+  /// For discs up to `largest_disc_mm` in radius; those below 1/16 of it count as that.
+  DipoleTable(const ProfileTriple& profiles, double largest_disc_mm, int thread_count);
 
   /// From a source to x_o.
   struct Distance {
@@ -77,8 +83,8 @@ class DipoleTable {
     ColorLanes slope;  ///< as DipoleProfile::Spread
     ColorLanes bend;
   };
-  void FillFar(const std::array<DipoleProfile, 3>& profiles);
-  void FillNear(const std::array<DipoleProfile, 3>& profiles,
+  void FillFar(const ProfileTriple& profiles);
+  void FillNear(const ProfileTriple& profiles,
                 double largest_disc_mm,
                 int thread_count);
 
@@ -86,8 +92,8 @@ class DipoleTable {
   SquaredDistanceAxis far_axis_;
   std::vector<FarEntry> far_;
   SquaredDistanceAxis near_axis_;
-  std::vector<ColorLanes> near_;  ///< a row for each of kDiscs squared radii
-  float discs_per_mm2_ = 0;
+  SquaredRadiusAxis disc_axis_;
+  std::vector<ColorLanes> near_;  ///< a row for each squared radius
 };
 
 }  // namespace nacre::render

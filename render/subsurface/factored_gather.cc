@@ -22,6 +22,19 @@ Vec2 operator-(Vec2 a, Vec2 b) {
   return {a.x - b.x, a.y - b.y};
 }
 
+/// Where in a window, in columns and rows, what lies at `plane` in the tangent plane
+/// and √`squared` away in space is looked up: in the direction of the one, at the
+/// distance of the other.
+Vec2 InWindow(Vec2 plane, float squared) {
+  const float in_plane = plane.x * plane.x + plane.y * plane.y;
+  if (in_plane > 1e-8F * squared) {
+    const float stretch = std::sqrt(squared / in_plane);
+    return {plane.x * stretch, plane.y * stretch};
+  }
+  // Straight through, any direction is as good as another.
+  return {std::sqrt(squared), 0};
+}
+
 class FactoredGather final : public Subsurface {
  public:
   FactoredGather(std::shared_ptr<const MaterialWindows> windows,
@@ -44,7 +57,7 @@ class FactoredGather final : public Subsurface {
     }
   }
 
-  Color Exitance(const SurfacePoint& x_o) const override {
+  Color Gather(const SurfacePoint& x_o, std::int64_t& pairs) const override {
     // First what to look up, then the looking up: the windows are many and lie all over
     // the memory, and so their cells can be on the way while others are being read.
     thread_local std::vector<Lookup> lookups;
@@ -63,6 +76,7 @@ class FactoredGather final : public Subsurface {
           }
         },
         add_patch);
+    pairs += std::ssize(lookups);
     constexpr std::size_t kAhead = 12;
     ColorLanes sum;
     for (std::size_t n = 0; n < lookups.size(); ++n) {
@@ -136,20 +150,13 @@ class FactoredGather final : public Subsurface {
             Dot(d_mm, d_mm) * per_mm_ * per_mm_};
   }
 
-  /// One lookup, of what lies at `plane` in the tangent plane and √`squared` away in
-  /// space: in the direction of the one, at the distance of the other.
+  /// One lookup, unless it is out of reach.
   void Add(const Source& source,
            Vec2 plane,
            float squared,
            float weight,
            std::vector<Lookup>& lookups) const {
-    const float in_plane = plane.x * plane.x + plane.y * plane.y;
-    // Straight through, any direction is as good as another.
-    Vec2 at{std::sqrt(squared), 0};
-    if (in_plane > 1e-8F * squared) {
-      const float stretch = std::sqrt(squared / in_plane);
-      at = {plane.x * stretch, plane.y * stretch};
-    }
+    const Vec2 at = InWindow(plane, squared);
     if (std::max(std::abs(at.x), std::abs(at.y)) < windows_->radius()) {
       lookups.push_back({&source, at.x, at.y, weight});
     }
@@ -200,16 +207,58 @@ class FactoredGather final : public Subsurface {
 
 class Factored final : public SubsurfaceModel {
  public:
-  Factored(std::shared_ptr<const factor::Material> material,
-           const FactoredOptions& options)
-      : windows_(std::make_shared<MaterialWindows>(material, options.window_cache_mb)),
-        eta_(static_cast<float>(material->eta)),
+  Factored(std::shared_ptr<const WindowSource> source, const FactoredOptions& options)
+      : windows_(std::make_shared<MaterialWindows>(source, options.window_cache_mb)),
+        eta_(static_cast<float>(source->eta)),
         options_(options) {}
 
   float Eta() const override { return eta_; }
   float PatchSizeMm() const override {
     return windows_->pitch_mm() / static_cast<float>(options_.patches_per_pitch);
   }
+
+  Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const override {
+    const Vec3 d = (x_o.position_mm - x_i.position_mm) / windows_->pitch_mm();
+    const Vec2 at =
+        InWindow({Dot(d, x_i.tangent_u), -Dot(d, x_i.tangent_v)}, Dot(d, d));
+    const ColorLanes rd = windows_->At(windows_->WindowAt(x_i.uv), at.x, at.y);
+    return {rd.v[0], rd.v[1], rd.v[2]};
+  }
+
+  // The mean over some windows and directions.
+  RadialDensity Spread() const override {
+    const double pitch = static_cast<double>(windows_->pitch_mm());
+    const double reach =
+        std::numbers::sqrt2 * static_cast<double>(windows_->radius()) * pitch;
+    constexpr int kPlaces = 4;
+    constexpr int kDirections = 16;
+    const auto mean = [&](double r_mm) {
+      const auto r = static_cast<float>(r_mm / pitch);
+      double sum = 0;
+      for (int n = 0; n < kPlaces * kPlaces * kDirections; ++n) {
+        const int place = n / kDirections;
+        const int window = windows_->WindowAt(
+            {(static_cast<float>(place % kPlaces) + 0.5F) / kPlaces,
+             (static_cast<float>(place / kPlaces) + 0.5F) / kPlaces});
+        const float angle = 2 * std::numbers::pi_v<float> *
+                            static_cast<float>(n % kDirections) / kDirections;
+        const ColorLanes rd =
+            windows_->At(window, r * std::cos(angle), r * std::sin(angle));
+        sum += static_cast<double>(rd.v[0] + rd.v[1] + rd.v[2]);
+      }
+      return sum;
+    };
+    return RadialDensity(mean, pitch / 8, reach);
+  }
+
+  ModelUse Use() const override {
+    return {.windows = windows_->evaluated_count(),
+            .windows_total = windows_->window_count(),
+            .tiles = windows_->source().tiles_read(),
+            .tiles_total = windows_->source().tiles_total(),
+            .channels = static_cast<int>(windows_->source().channels.size())};
+  }
+
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int /*thread_count*/) const override {
     return std::make_unique<FactoredGather>(
@@ -224,12 +273,16 @@ class Factored final : public SubsurfaceModel {
 
 }  // namespace
 
+std::shared_ptr<const SubsurfaceModel> MakeMeasured(
+    std::shared_ptr<const WindowSource> source, const FactoredOptions& options) {
+  Expect(source != nullptr, "a measured subsurface model needs a source");
+  Validate(options);
+  return std::make_shared<Factored>(std::move(source), options);
+}
+
 std::shared_ptr<const SubsurfaceModel> MakeFactored(
     std::shared_ptr<const factor::Material> material, const FactoredOptions& options) {
-  Expect(material != nullptr, "a factored subsurface model needs a material");
-  Validate(options);
-  factor::Validate(*material, "subsurface");
-  return std::make_shared<Factored>(std::move(material), options);
+  return MakeMeasured(MakeMaterialSource(std::move(material)), options);
 }
 
 }  // namespace nacre::render

@@ -47,13 +47,13 @@ int NearestWindow(float along, int points) {
 
 }  // namespace
 
-MaterialWindows::MaterialWindows(std::shared_ptr<const factor::Material> material,
+MaterialWindows::MaterialWindows(std::shared_ptr<const WindowSource> source,
                                  double cache_mb)
-    : material_(std::move(material)),
-      channel_of_colour_(ChannelsOfColours(material_->channels)),
-      columns_(2 * material_->points_x - 1),
-      rows_(2 * material_->points_y - 1),
-      radius_(static_cast<float>(material_->core / 2 + 1)),
+    : source_(std::move(source)),
+      channel_of_colour_(ChannelsOfColours(source_->channels)),
+      columns_(2 * source_->points_x - 1),
+      rows_(2 * source_->points_y - 1),
+      radius_(static_cast<float>(source_->core / 2 + 1)),
       kept_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_)) {
   const std::size_t lanes = CellCount() + WindowCentre::Nodes().size();
   const double window_bytes = static_cast<double>(sizeof(ColorLanes) * lanes);
@@ -67,8 +67,8 @@ MaterialWindows::~MaterialWindows() {
 }
 
 int MaterialWindows::WindowAt(Vec2 uv) const {
-  const int column = NearestWindow(uv.x, material_->points_x);
-  const int row = NearestWindow(1 - uv.y, material_->points_y);
+  const int column = NearestWindow(uv.x, source_->points_x);
+  const int row = NearestWindow(1 - uv.y, source_->points_y);
   return row * columns_ + column;
 }
 
@@ -86,12 +86,12 @@ MaterialWindows::Points MaterialWindows::PointsOf(int window) const {
 
 ColorLanes MaterialWindows::Cell(const Points& points, int u, int v) const {
   ColorLanes sum;
-  if (u < 0 || v < 0 || u >= material_->core || v >= material_->core) {
+  if (u < 0 || v < 0 || u >= source_->core || v >= source_->core) {
     return sum;
   }
   for (std::size_t p = 0; p < points.count; ++p) {
     for (std::size_t c = 0; c < 3; ++c) {
-      sum.v[c] += material_->Evaluate(
+      sum.v[c] += source_->Evaluate(
           channel_of_colour_[c], points.ij[p][0], points.ij[p][1], u, v);
     }
   }
@@ -99,7 +99,7 @@ ColorLanes MaterialWindows::Cell(const Points& points, int u, int v) const {
 }
 
 std::unique_ptr<ColorLanes[]> MaterialWindows::Evaluate(const Points& points) const {
-  const int core = material_->core;
+  const int core = source_->core;
   const auto side = static_cast<std::size_t>(core + 2);
   constexpr std::size_t kNodes = WindowCentre::Nodes().size();
   auto window = std::make_unique<ColorLanes[]>(CellCount() + kNodes);
@@ -109,7 +109,7 @@ std::unique_ptr<ColorLanes[]> MaterialWindows::Evaluate(const Points& points) co
       const bool same_as_before =
           c > 0 && channel_of_colour_[c] == channel_of_colour_[c - 1];
       if (!same_as_before) {
-        material_->EvaluateWindow(
+        source_->EvaluateWindow(
             channel_of_colour_[c], points.ij[p][0], points.ij[p][1], values.data());
       }
       std::size_t n = 0;
@@ -166,8 +166,8 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
     const Points points = PointsOf(window);
     WindowCentre::Cells middle;
     for (int n = 0; n < 25; ++n) {
-      middle[static_cast<std::size_t>(n)] = Cell(
-          points, material_->core / 2 + n % 5 - 2, material_->core / 2 + n / 5 - 2);
+      middle[static_cast<std::size_t>(n)] =
+          Cell(points, source_->core / 2 + n % 5 - 2, source_->core / 2 + n / 5 - 2);
     }
     return WindowCentre::At(WindowCentre(middle).nodes().data(), column, row);
   }
@@ -178,7 +178,7 @@ ColorLanes MaterialWindows::At(int window, float column, float row) const {
   const float across = x - static_cast<float>(u);
   const float down = y - static_cast<float>(v);
   if (kept != nullptr) {
-    const auto side = static_cast<std::size_t>(material_->core + 2);
+    const auto side = static_cast<std::size_t>(source_->core + 2);
     const ColorLanes* cell =
         kept + static_cast<std::size_t>(v) * side + static_cast<std::size_t>(u);
     return Mix(
@@ -197,7 +197,7 @@ void MaterialWindows::Prefetch(int window, float column, float row) const {
       WindowCentre::Covers(column, row)) {
     return;  // centres are small, and read by patches that are near each other
   }
-  const int side = material_->core + 2;
+  const int side = source_->core + 2;
   const ColorLanes* cell = kept + static_cast<int>(row + radius_) * side +
                            static_cast<int>(column + radius_);
   __builtin_prefetch(cell);
@@ -210,11 +210,9 @@ Color MaterialWindows::Albedo(int window) const {
   const Points points = PointsOf(window);
   std::array<float, 3> sum{};
   for (std::size_t p = 0; p < points.count; ++p) {
-    const std::int64_t point =
-        std::int64_t{points.ij[p][1]} * material_->points_x + points.ij[p][0];
     for (std::size_t c = 0; c < 3; ++c) {
-      sum[c] += material_->albedo[static_cast<std::size_t>(
-          channel_of_colour_[c] * material_->PointCount() + point)];
+      sum[c] +=
+          source_->Albedo(channel_of_colour_[c], points.ij[p][0], points.ij[p][1]);
     }
   }
   return Color{sum[0], sum[1], sum[2]} / static_cast<float>(points.count);

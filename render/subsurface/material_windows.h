@@ -1,8 +1,8 @@
 #pragma once
 
-#include "factor/material.h"
 #include "render/subsurface/color_lanes.h"
 #include "render/subsurface/window_centre.h"
+#include "render/subsurface/window_source.h"
 
 #include <array>
 #include <atomic>
@@ -22,7 +22,7 @@ namespace nacre::render {
 class MaterialWindows {
  public:
   /// BadData unless the material has one channel (used for all three colours) or three.
-  MaterialWindows(std::shared_ptr<const factor::Material> material, double cache_mb);
+  MaterialWindows(std::shared_ptr<const WindowSource> source, double cache_mb);
   ~MaterialWindows();
   MaterialWindows(const MaterialWindows&) = delete;
   MaterialWindows& operator=(const MaterialWindows&) = delete;
@@ -41,10 +41,12 @@ class MaterialWindows {
   /// Σ_d R_d · pitch² of a window, by the material's own albedo map.
   Color Albedo(int window) const;
 
-  float pitch_mm() const { return static_cast<float>(material_->pitch_mm); }
+  float pitch_mm() const { return static_cast<float>(source_->pitch_mm); }
   /// Beyond this many pitches, to any side, R_d is zero.
   float radius() const { return radius_; }
   std::int64_t evaluated_count() const { return evaluated_count_.load(); }
+  std::int64_t window_count() const { return std::ssize(kept_); }
+  const WindowSource& source() const { return *source_; }
 
  private:
   /// The one, two or four grid points that a window is the mean of.
@@ -58,11 +60,11 @@ class MaterialWindows {
   std::unique_ptr<ColorLanes[]> Evaluate(const Points& points) const;
   const ColorLanes* Find(int window) const;
   std::size_t CellCount() const {
-    const auto side = static_cast<std::size_t>(material_->core + 2);
+    const auto side = static_cast<std::size_t>(source_->core + 2);
     return side * side;
   }
 
-  std::shared_ptr<const factor::Material> material_;
+  std::shared_ptr<const WindowSource> source_;
   std::array<int, 3> channel_of_colour_{};
   int columns_ = 0;  ///< windows along x
   int rows_ = 0;

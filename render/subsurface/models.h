@@ -3,6 +3,7 @@
 #include "core/options.h"
 #include "factor/material.h"
 #include "render/subsurface/subsurface.h"
+#include "render/subsurface/window_source.h"
 
 #include <memory>
 
@@ -63,6 +64,11 @@ struct FactoredOptions {
           "memory for evaluated windows; those beyond it cost time");
   }
 };
+
+/// R_d as measured, from wherever. One channel serves all three colours, three serve
+/// R, G, B in order; BadData for any other number.
+std::shared_ptr<const SubsurfaceModel> MakeMeasured(
+    std::shared_ptr<const WindowSource> source, const FactoredOptions& options = {});
 
 /// A measured, factored material (`<subsurface type="svd">`). One channel serves all
 /// three colours, three serve R, G, B in order; BadData for any other number.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "render/subsurface/radial_density.h"
 #include "render/vec.h"
 
 #include <cstdint>
@@ -33,7 +34,22 @@ class Subsurface {
   virtual ~Subsurface() = default;
 
   /// Radiant exitance (before the factor F_t(η, ω_o) / (π c(η)) that gives radiance).
-  virtual Color Exitance(const SurfacePoint& x_o) const = 0;
+  /// Adds to `pairs` the number of sources, patches or clusters, that were asked.
+  virtual Color Gather(const SurfacePoint& x_o, std::int64_t& pairs) const = 0;
+
+  Color Exitance(const SurfacePoint& x_o) const {
+    std::int64_t pairs = 0;
+    return Gather(x_o, pairs);
+  }
+};
+
+/// What of a material has been used since it was made.
+struct ModelUse {
+  std::int64_t windows = 0;        ///< evaluated; 0 for models without
+  std::int64_t windows_total = 0;  ///< that there are
+  std::int64_t tiles = 0;          ///< read from file; 0 for what is in memory
+  std::int64_t tiles_total = 0;
+  int channels = 3;
 };
 
 /// A material, before it has seen any light.
@@ -48,6 +64,14 @@ class SubsurfaceModel {
   /// gathered exitance is good to about 1 %: a fraction of the mean free path or of the
   /// pitch.
   virtual float PatchSizeMm() const = 0;
+
+  /// R_d(x_i, x_o) itself, in mm⁻²: what `Illuminate` gathers, without patches.
+  virtual Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const = 0;
+
+  /// Distances in the plane, distributed about as light spreads.
+  virtual RadialDensity Spread() const = 0;
+
+  virtual ModelUse Use() const { return {}; }
 
   /// The model with its light. `lit` may be reordered and kept.
   virtual std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,

@@ -211,13 +211,13 @@ TEST(RenderTest, SnapshotsComeBetweenPassesAndProgressCanStop) {
 
 TEST(RenderTest, UnknownIntegratorsAreUsageErrors) {
   RenderOptions options = With(1);
-  options.integrator = "reference";
+  options.integrator = "refrence";
   try {
     Render(Parse(SceneText("")), options);
     ADD_FAILURE() << "accepted";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kUsage);
-    EXPECT_THAT(e.what(), HasSubstr("there are scene, path, direct and fast"));
+    EXPECT_THAT(e.what(), HasSubstr("there are scene, path, direct, fast and reference"));
   }
 }
 
@@ -231,7 +231,7 @@ TEST(RenderTest, AnEmptySceneIsBlack) {
 class LocalSubsurface : public Subsurface {
  public:
   explicit LocalSubsurface(std::vector<LitPoint> lit) : lit_(std::move(lit)) {}
-  Color Exitance(const SurfacePoint& x_o) const override {
+  Color Gather(const SurfacePoint& x_o, std::int64_t&) const override {
     const LitPoint* nearest = &lit_.front();
     for (const LitPoint& point : lit_) {
       const auto distance2 = [&](const LitPoint& p) {
@@ -252,6 +252,8 @@ class LocalModel : public SubsurfaceModel {
   explicit LocalModel(float eta) : eta_(eta) {}
   float Eta() const override { return eta_; }
   float PatchSizeMm() const override { return 0.5F; }
+  Color Rd(const SurfacePoint&, const SurfacePoint&) const override { return {}; }
+  RadialDensity Spread() const override { return {}; }
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int) const override {
     return std::make_unique<LocalSubsurface>(std::move(lit));
@@ -299,7 +301,7 @@ TEST(LitPointsTest, FluxUnderADirectionalLightIsExact) {
                      1.4F);
   scene.shapes[0].translucency->mm_per_unit = 3;
   const World world(scene, 1);
-  const std::vector<std::unique_ptr<ExitanceField>> dark(1);
+  const ExitanceSources dark(1);
   const PathTracer tracer(world, dark, scene.integrator);
   const LitPoints lit = SampleLitPoints(world, 0, tracer, {});
   EXPECT_NEAR(lit.area_mm2, 36, 1e-4);
@@ -323,7 +325,7 @@ TEST(LitPointsTest, FluxUnderADirectionalLightIsExact) {
 TEST(LitPointsTest, PointsSpreadEvenly) {
   const Scene scene = WithLocalModel(SceneText(R"(<shape type="rectangle"/>)"), 1);
   const World world(scene, 1);
-  const std::vector<std::unique_ptr<ExitanceField>> dark(1);
+  const ExitanceSources dark(1);
   const PathTracer tracer(world, dark, scene.integrator);
   const LitPoints lit = SampleLitPoints(
       world, 0, tracer, {.points_per_patch = 16, .max_points = 1 << 20});
@@ -350,7 +352,7 @@ TEST(LitPointsTest, IndirectLightComesWithThePathIntegrator) {
     <emitter type="point"><point name="position" x="0" y="0" z="-20"/></emitter>)");
   Scene scene = WithLocalModel(text, 1);
   const World world(scene, 1);
-  const std::vector<std::unique_ptr<ExitanceField>> dark(2);
+  const ExitanceSources dark(2);
   const PathTracer tracer(world, dark, scene.integrator);
   const auto total = [&](bool indirect) {
     double flux = 0;
@@ -367,7 +369,7 @@ TEST(LitPointsTest, IndirectLightComesWithThePathIntegrator) {
 // An exitance that varies like a plane wave along x, in mm.
 class WaveSubsurface : public Subsurface {
  public:
-  Color Exitance(const SurfacePoint& p) const override {
+  Color Gather(const SurfacePoint& p, std::int64_t&) const override {
     const float v = 2 + std::sin(p.position_mm.x * 0.7F + p.position_mm.z * 0.4F);
     return {v, 2 * v, 0};
   }
@@ -384,8 +386,8 @@ TEST(ExitanceFieldTest, InterpolatesWithinItsSpacingOnEveryShape) {
     EXPECT_GT(coarse.grid_size(), 1000);
     EXPECT_EQ(exact.grid_size(), 0);
     const AreaSampler area(shape);
-    std::int64_t asked_coarse = 0;
-    std::int64_t asked_exact = 0;
+    PathCounters asked_coarse;
+    PathCounters asked_exact;
     for (std::uint32_t i = 0; i < 2000; ++i) {
       Sampler sampler(1, i);
       const SurfaceHit hit = area.Sample(sampler.Next2D());
@@ -395,7 +397,7 @@ TEST(ExitanceFieldTest, InterpolatesWithinItsSpacingOnEveryShape) {
       EXPECT_NEAR(a.x, b.x, 0.012F) << type;
       EXPECT_NEAR(a.y, 2 * a.x, 1e-4F);
     }
-    EXPECT_EQ(asked_exact, 2000);
+    EXPECT_EQ(asked_exact.evaluations, 2000);
   }
 }
 
@@ -404,11 +406,11 @@ TEST(ExitanceFieldTest, AsksTheModelOnceAPoint) {
   const Shape& shape = scene.shapes[0];
   const ExitanceField field(shape, std::make_unique<WaveSubsurface>(), 0.5F);
   const SurfaceHit hit = MeshPoint(shape, 0, {0.31F, 0.22F});
-  std::int64_t asked = 0;
+  PathCounters asked;
   const Color first = field.At(hit, asked);
-  EXPECT_EQ(asked, 3);
+  EXPECT_EQ(asked.evaluations, 3);
   EXPECT_EQ(field.At(hit, asked), first);
-  EXPECT_EQ(asked, 3);
+  EXPECT_EQ(asked.evaluations, 3);
 }
 
 TEST(ToneTest, ExposesAndEncodes) {

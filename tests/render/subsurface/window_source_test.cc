@@ -1,0 +1,94 @@
+#include "render/subsurface/window_source.h"
+
+#include "reconstruct/rd_dataset.h"
+#include "render/subsurface/models.h"
+#include "tests/render/scene_text.h"
+#include "tests/render/subsurface/handmade_material.h"
+#include "tests/support/temp_folder.h"
+
+#include <gmock/gmock.h>
+
+namespace nacre::render::testing {
+namespace {
+
+std::shared_ptr<const factor::Material> SmallMaterial() {
+  return DipoleMaterial({DipoleProfile(0.05, 1, 0.6),
+                         DipoleProfile(0.02, 2, 0.6),
+                         DipoleProfile(0.01, 2, 0.6)},
+                        {.points = 8, .core = 9, .pitch_mm = 0.5});
+}
+
+// The windows of a material as a dataset.
+std::filesystem::path WriteWindows(const factor::Material& m,
+                                   const std::filesystem::path& path) {
+  reconstruct::RdHeader header;
+  header.points_x = m.points_x;
+  header.points_y = m.points_y;
+  header.core = m.core;
+  header.pitch_mm = m.pitch_mm;
+  header.eta = m.eta;
+  header.channels = m.channels;
+  header.provenance = "{}";
+  reconstruct::RdWriter writer(path, header);
+  for (int j = 0; j < m.points_y; ++j) {
+    for (int i = 0; i < m.points_x; ++i) {
+      reconstruct::RdSlice slice = reconstruct::MakeSlice(header);
+      for (int c = 0; c < 3; ++c) {
+        m.EvaluateWindow(
+            c, i, j, &slice.rd[static_cast<std::size_t>(c * header.WindowSize())]);
+      }
+      writer.WriteSlice(i, j, slice);
+    }
+  }
+  writer.Finish();
+  return path;
+}
+
+TEST(WindowSourceTest, ADatasetIsRenderedAsTheMaterialThatSaysTheSame) {
+  const nacre::testing::TempFolder folder;
+  const auto material = SmallMaterial();
+  const auto path = WriteWindows(*material, folder.path() / "sample.rd.exr");
+  const auto dataset = OpenDatasetSource(path);
+  const auto factored = MakeMaterialSource(material);
+  EXPECT_EQ(dataset->tiles_total(), 64);
+  EXPECT_EQ(dataset->tiles_read(), 0);
+  for (int c = 0; c < 3; ++c) {
+    for (const int u : {0, 4, 8}) {
+      EXPECT_EQ(dataset->Evaluate(c, 3, 5, u, 4), factored->Evaluate(c, 3, 5, u, 4));
+    }
+    EXPECT_NEAR(dataset->Albedo(c, 3, 5), factored->Albedo(c, 3, 5), 1e-6F);
+  }
+  EXPECT_EQ(dataset->tiles_read(), 1);
+
+  const auto by_dataset = MakeMeasured(dataset);
+  const auto by_material = MakeFactored(material);
+  SurfacePoint x_i{};
+  x_i.normal = {0, 0, 1};
+  x_i.tangent_u = {1, 0, 0};
+  x_i.tangent_v = {0, 1, 0};
+  x_i.uv = {0.4F, 0.6F};
+  SurfacePoint x_o = x_i;
+  x_o.position_mm = {0.7F, 0.3F, 0};
+  EXPECT_EQ(by_dataset->Rd(x_i, x_o), by_material->Rd(x_i, x_o));
+  EXPECT_LT(by_dataset->Use().tiles, 8);
+}
+
+TEST(WindowSourceTest, AScenesMaterialMayBeADataset) {
+  const nacre::testing::TempFolder folder;
+  const auto path = WriteWindows(*SmallMaterial(), folder.path() / "sample.rd.exr");
+  const Scene scene = Parse(SceneText(R"(
+    <emitter type="directional"><vector name="direction" x="0" y="0" z="-1"/></emitter>
+    <shape type="rectangle"><subsurface type="svd">
+      <string name="material" value=")" +
+                                      path.string() + R"("/></subsurface></shape>)"));
+  RenderOptions options;
+  options.spp = 4;
+  const Rendering r = Render(scene, options);
+  EXPECT_GT(ChannelStatistics(r.image, 1).mean, 0.05);
+  EXPECT_GT(r.summary.use.tiles, 1);
+  EXPECT_EQ(r.summary.use.tiles_total, 64);
+  EXPECT_EQ(r.summary.use.channels, 3);
+}
+
+}  // namespace
+}  // namespace nacre::render::testing
