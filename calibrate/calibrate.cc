@@ -1,14 +1,20 @@
 #include "calibrate/calibrate.h"
 
 #include "calibrate/geometry.h"
+#include "calibrate/glare_estimate.h"
 #include "calibrate/laser_map.h"
 #include "calibrate/radiometry.h"
+#include "calibrate/rate_picture.h"
+#include "calibrate/response.h"
+#include "calibrate/warnings.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/options_json.h"
 #include "core/provenance.h"
 
+#include <algorithm>
 #include <fmt/format.h>
+#include <utility>
 
 namespace nacre::calibrate {
 namespace {
@@ -16,8 +22,18 @@ namespace {
 // What both the laser map and the whole calibration begin with.
 struct Foundation {
   GeometryResult geometry;
-  DarkLevel dark;
+  DarkResult dark;
+  double saturation_counts = 0;
+  ResponseResult response;
+  SmoothField reference_ambient;
   LaserMapResult laser;
+
+  RatePictures Pictures() const {
+    RatePictures pictures(dark, response.linearity);
+    pictures.SetAmbient(
+        reference_ambient, geometry.camera.width_px, geometry.camera.height_px);
+    return pictures;
+  }
 };
 
 Foundation EstimateFoundation(const acquire::SessionReader& session,
@@ -35,8 +51,12 @@ Foundation EstimateFoundation(const acquire::SessionReader& session,
         f.geometry.reprojection_rms_px,
         options.max_reprojection_rms_px));
   }
-  f.dark = EstimateDark(session);
-  f.laser = EstimateLaserMap(session, f.geometry.camera, f.dark);
+  f.dark = EstimateDarkMaps(session);
+  // Where the sensor saturates must be known before its curve, its gain after.
+  f.saturation_counts = EstimatePhotonTransfer(session, f.dark).saturation_counts;
+  f.response = EstimateResponse(session, f.dark, f.saturation_counts);
+  f.reference_ambient = EstimateAmbient(session, f.dark, f.response.linearity, 0);
+  f.laser = EstimateLaserMap(session, f.geometry.camera, f.Pictures());
   if (!(f.laser.rms_mm <= options.max_laser_map_rms_mm)) {
     throw BadData(fmt::format(
         "{}: the laser map misses its spots by {:.4f} mm rms, more than "
@@ -46,6 +66,65 @@ Foundation EstimateFoundation(const acquire::SessionReader& session,
         options.max_laser_map_rms_mm));
   }
   return f;
+}
+
+void StoreGeometry(const Foundation& f, Calibration& calibration) {
+  calibration.camera = f.geometry.camera;
+  calibration.reprojection_rms_px = f.geometry.reprojection_rms_px;
+  calibration.focal_sigma_px = f.geometry.focal_sigma_px;
+  calibration.centre_sigma_px = f.geometry.centre_sigma_px;
+  calibration.height_sigma_mm = f.geometry.height_sigma_mm;
+  calibration.scan_map = f.laser.map;
+  calibration.laser_map_rms_mm = f.laser.rms_mm;
+  calibration.laser_map_max_mm = f.laser.max_mm;
+  calibration.laser_map_held_out_rms_mm = f.laser.held_out_rms_mm;
+  calibration.corrections.hysteresis = f.laser.hysteresis;
+}
+
+void StoreSensor(const Foundation& f,
+                 const PhotonTransfer& transfer,
+                 Calibration& calibration) {
+  calibration.dark = f.dark.level;
+  calibration.gain_electrons_per_count = transfer.gain_electrons_per_count;
+  calibration.gain_sigma_electrons_per_count = transfer.gain_sigma_electrons_per_count;
+  calibration.read_noise_electrons = transfer.read_noise_electrons;
+  calibration.read_noise_sigma_electrons = transfer.read_noise_sigma_electrons;
+  calibration.saturation_counts = transfer.saturation_counts;
+  calibration.corrections.linearity = f.response.linearity;
+  calibration.corrections.hot_pixels = f.dark.hot_pixels;
+  calibration.corrections.dark_spread_counts_per_us = f.dark.spread_counts_per_us;
+  calibration.corrections.row_noise_counts = f.dark.row_noise_counts;
+}
+
+// At most that many points of a kind: a figure shows no more.
+constexpr std::size_t kMostPoints = 400;
+
+Diagnostics DiagnosticsOf(const Foundation& f) {
+  Diagnostics diagnostics;
+  const auto every = [](std::size_t count) {
+    return std::max<std::size_t>(1, (count + kMostPoints - 1) / kMostPoints);
+  };
+  const std::vector<CornerResidual>& corners = f.geometry.residuals;
+  for (std::size_t k = 0; k < corners.size(); k += every(corners.size())) {
+    const CornerResidual& r = corners[k];
+    diagnostics.corners_px.push_back({r.at.x, r.at.y, r.off.x, r.off.y});
+  }
+  for (const SpotResidual& r : f.laser.residuals) {
+    diagnostics.spots_mm.push_back({r.at.x, r.at.y, r.off.x, r.off.y});
+  }
+  const std::vector<ResponsePoint>& points = f.response.points;
+  for (std::size_t k = 0; k < points.size(); k += every(points.size())) {
+    diagnostics.response.push_back(
+        {points[k].counts, points[k].deviation, points[k].residual});
+  }
+  return diagnostics;
+}
+
+// Farther from a spot than its own light reaches, pixels.
+double BeyondSpotPx(const Foundation& f) {
+  // Spots are a pixel or two wide, whatever the sensor; somewhat more of a fine one.
+  constexpr double kLeastPx = 4;
+  return kLeastPx + f.geometry.camera.width_px / 500.0;
 }
 
 // Of the pictures used; the rest of the session doesn't matter, nor does when it was.
@@ -69,19 +148,48 @@ Calibration Calibrate(const acquire::SessionReader& session,
                       const CalibrateOptions& options,
                       const ProgressFunction& progress) {
   const Foundation f = EstimateFoundation(session, options, progress);
-  const PhotonTransfer transfer = EstimatePhotonTransfer(session, f.dark);
+  const PhotonTransfer transfer =
+      EstimatePhotonTransfer(session, f.dark, f.response.linearity);
   Calibration calibration;
-  calibration.camera = f.geometry.camera;
-  calibration.dark = f.dark;
-  calibration.gain_electrons_per_count = transfer.gain_electrons_per_count;
-  calibration.read_noise_electrons = transfer.read_noise_electrons;
-  calibration.saturation_counts = transfer.saturation_counts;
-  calibration.channels = EstimateFluxScales(
-      session, f.geometry.camera, f.laser.map, f.dark, transfer.saturation_counts);
-  calibration.scan_map = f.laser.map;
-  calibration.reprojection_rms_px = f.geometry.reprojection_rms_px;
-  calibration.laser_map_rms_mm = f.laser.rms_mm;
-  calibration.laser_map_max_mm = f.laser.max_mm;
+  StoreGeometry(f, calibration);
+  StoreSensor(f, transfer, calibration);
+  Corrections& corrections = calibration.corrections;
+  const int width = f.geometry.camera.width_px;
+  const int height = f.geometry.camera.height_px;
+  const FlatResult flat = EstimateFlatField(session,
+                                            f.dark,
+                                            f.response.linearity,
+                                            transfer.saturation_counts,
+                                            transfer.gain_electrons_per_count);
+  corrections.flat_field = flat.field;
+  corrections.ambient = EstimateAmbient(session, f.dark, f.response.linearity, 1);
+  RatePictures pictures = f.Pictures();
+  const std::vector<acquire::ScanAngle>& lattice = session.schedule().lattice();
+  const GlareResult glare =
+      EstimateGlare(session,
+                    pictures,
+                    f.geometry.camera.PixelFromSample(
+                        f.laser.map.SampleFromAngle(lattice[lattice.size() / 2])),
+                    transfer.saturation_counts,
+                    BeyondSpotPx(f));
+  corrections.glare = glare.glare;
+  corrections.blooming = glare.blooming;
+  pictures.SetGlare(glare.glare, width, height);
+  pictures.SetFlatField(flat.field, width, height);
+  FluxResult flux =
+      EstimateFluxScales(session, f.geometry.camera, f.laser.map, pictures, transfer);
+  calibration.channels = std::move(flux.channels);
+  corrections.spots = std::move(flux.spots);
+  corrections.light_noise = flux.light_noise;
+  calibration.diagnostics = DiagnosticsOf(f);
+  corrections.warnings =
+      WarningsOf(calibration,
+                 {.flat_residual = flat.residual,
+                  .flat_noise = flat.noise,
+                  .reference_ambient = f.reference_ambient,
+                  .missed_spots = f.laser.missed,
+                  .pitch_mm = session.rig().grid.pitch_mm,
+                  .longest_exposure_us = session.rig().camera.exposures_us.front()});
   calibration.session_rig_hash = session.manifest().rig_hash;
   calibration.provenance =
       Provenance{.command = "calibrate",

@@ -41,8 +41,9 @@ double Calibration::RdPerRate(int channel, PointMm x_i, PointMm x_o, double eta)
 double Calibration::VarianceCounts2(double signal_counts) const {
   const double read_counts = read_noise_electrons / gain_electrons_per_count;
   constexpr double kRounding = 1.0 / 12;
+  const double row_counts = corrections.row_noise_counts;
   return signal_counts / gain_electrons_per_count + read_counts * read_counts +
-         kRounding;
+         row_counts * row_counts + kRounding;
 }
 
 }  // namespace nacre::calibrate

@@ -73,6 +73,15 @@ struct ChannelResponse {
   double flux_scale_sigma = 0;
 };
 
+/// What figures of a calibration are drawn from; no stage computes with it. Arrows are
+/// {x, y, dx, dy}: where, and by how much it is off.
+struct Diagnostics {
+  std::vector<std::array<double, 4>> corners_px;  ///< of the checkerboard
+  std::vector<std::array<double, 4>> spots_mm;    ///< of the laser lattice
+  /// {counts above dark, deviation from a straight line, the same once corrected}
+  std::vector<std::array<double, 3>> response;
+};
+
 /// Everything needed to turn counts into R_d; made from pictures alone.
 struct Calibration {
   CameraGeometry camera;
@@ -93,6 +102,7 @@ struct Calibration {
   double centre_sigma_px = 0;
   double height_sigma_mm = 0;  ///< of the sample plane's distance from the camera
   Corrections corrections;
+  Diagnostics diagnostics;
   std::string session_rig_hash;  ///< of the rig description it was made for
   std::string provenance;        ///< JSON text, see core/provenance.h
 
@@ -106,7 +116,8 @@ struct Calibration {
   double RdPerRate(int channel, PointMm x_i, PointMm x_o, double eta) const;
 
   /// Variance of one pixel's counts whose signal above dark is `signal_counts`
-  /// (≥ 0): shot noise, read noise and rounding [EMVA1288, eq. 9].
+  /// (≥ 0, linear): shot noise, read noise, that of rows and rounding [EMVA1288, eq.
+  /// 9].
   double VarianceCounts2(double signal_counts) const;
 };
 

@@ -60,6 +60,13 @@ std::array<double, N> Numbers(const Json& json,
   return array;
 }
 
+template <std::size_t N>
+std::vector<std::array<double, N>> Rows(const Json& json,
+                                        const char* key,
+                                        const std::string& origin) {
+  return Get<std::vector<std::array<double, N>>>(json, key, origin);
+}
+
 CameraGeometry CameraFromJson(const Json& json, const std::string& origin) {
   CameraGeometry camera;
   constexpr double kMaxSide = 1 << 16;
@@ -166,6 +173,10 @@ void WriteCalibration(const std::filesystem::path& path,
            {"laser_map_max_mm", calibration.laser_map_max_mm},
            {"laser_map_held_out_rms_mm", calibration.laser_map_held_out_rms_mm},
            {"corrections", internal::ToJson(calibration.corrections)},
+           {"diagnostics",
+            {{"corners_px", calibration.diagnostics.corners_px},
+             {"spots_mm", calibration.diagnostics.spots_mm},
+             {"response", calibration.diagnostics.response}}},
            {"provenance", ParseJson(calibration.provenance, path.string())}});
 }
 
@@ -210,6 +221,11 @@ Calibration ReadCalibration(const std::filesystem::path& path) {
         Get<Json>(json, "corrections", origin),
         origin + ": corrections",
         std::int64_t{calibration.camera.width_px} * calibration.camera.height_px);
+    const Json diagnostics = Get<Json>(json, "diagnostics", origin);
+    const std::string where = origin + ": diagnostics";
+    calibration.diagnostics = {.corners_px = Rows<4>(diagnostics, "corners_px", where),
+                               .spots_mm = Rows<4>(diagnostics, "spots_mm", where),
+                               .response = Rows<3>(diagnostics, "response", where)};
   }
   return calibration;
 }

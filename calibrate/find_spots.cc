@@ -6,7 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <utility>
 
 namespace nacre::calibrate {
 namespace {
@@ -99,10 +99,8 @@ double ClosestPair(const std::vector<Blob>& blobs) {
 
 }  // namespace
 
-std::vector<PixelPoint> FindSpots(const std::vector<float>& signal,
-                                  int width,
-                                  int height,
-                                  int count) {
+std::vector<PixelPoint> FindSpots(
+    const std::vector<float>& signal, int width, int height, int count, int missing) {
   Expect(signal.size() ==
              static_cast<std::size_t>(width) * static_cast<std::size_t>(height),
          "width * height values");
@@ -114,22 +112,26 @@ std::vector<PixelPoint> FindSpots(const std::vector<float>& signal,
   cv::minMaxLoc(smooth, nullptr, &brightest);
   // Spots of one channel differ little, so that one of these levels parts them all from
   // the ground and from each other.
+  std::vector<Blob> best;
   for (const double fraction : {0.25, 0.4, 0.15, 0.55, 0.08}) {
-    const std::vector<Blob> blobs = FindBlobs(smooth, fraction * brightest);
-    if (std::ssize(blobs) != count) {
-      continue;
+    std::vector<Blob> blobs = FindBlobs(smooth, fraction * brightest);
+    if (best.empty() ||
+        std::abs(std::ssize(blobs) - count) < std::abs(std::ssize(best) - count)) {
+      best = std::move(blobs);
     }
-    // A blob's edge lies at 1.1 to 2.2 standard deviations of a Gaussian spot, so that
-    // twice as far holds nearly all of it, and little noise besides.
-    const double reach_px = 0.45 * ClosestPair(blobs);
-    std::vector<PixelPoint> spots;
-    for (const Blob& blob : blobs) {
-      spots.push_back(
-          Centroid(picture, blob, std::min(reach_px, 2 * blob.radius_px + 1)));
-    }
+  }
+  std::vector<PixelPoint> spots;
+  if (best.empty() || std::abs(std::ssize(best) - count) > missing) {
     return spots;
   }
-  return {};
+  // A blob's edge lies at 1.1 to 2.2 standard deviations of a Gaussian spot, so that
+  // twice as far holds nearly all of it, and little noise besides.
+  const double reach_px = 0.45 * ClosestPair(best);
+  for (const Blob& blob : best) {
+    spots.push_back(
+        Centroid(picture, blob, std::min(reach_px, 2 * blob.radius_px + 1)));
+  }
+  return spots;
 }
 
 }  // namespace nacre::calibrate

@@ -165,6 +165,9 @@ GeometryResult EstimateGeometry(const acquire::SessionReader& session,
   std::vector<cv::Vec3d> translations_mm;
   constexpr int kMaxIterations = 200;
   // k3 is left at 0: a few boards of moderate angle can't tell it from k2.
+  cv::Mat intrinsics_sigma;
+  cv::Mat extrinsics_sigma;
+  cv::Mat view_errors;
   const double rms_px = cv::calibrateCamera(
       points_mm,
       corners_px,
@@ -173,13 +176,39 @@ GeometryResult EstimateGeometry(const acquire::SessionReader& session,
       distortion,
       rotations,
       translations_mm,
+      intrinsics_sigma,
+      extrinsics_sigma,
+      view_errors,
       cv::CALIB_FIX_K3,
       cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS,
                        kMaxIterations,
                        std::numeric_limits<double>::epsilon()));
-  return {.camera =
-              ToGeometry(info, matrix, distortion, {rotations[0], translations_mm[0]}),
-          .reprojection_rms_px = rms_px};
+  GeometryResult result;
+  result.camera =
+      ToGeometry(info, matrix, distortion, {rotations[0], translations_mm[0]});
+  result.reprojection_rms_px = rms_px;
+  const auto intrinsic = [&](int k) { return intrinsics_sigma.at<double>(k); };
+  result.focal_sigma_px = std::max(intrinsic(0), intrinsic(1));
+  result.centre_sigma_px = std::max(intrinsic(2), intrinsic(3));
+  constexpr int kHeight = 5;  // three angles and x, y come before z, pose 0 first
+  result.height_sigma_mm = extrinsics_sigma.at<double>(kHeight);
+  for (std::size_t pose = 0; pose < corners_px.size(); ++pose) {
+    std::vector<cv::Point2f> projected;
+    cv::projectPoints(points_mm[pose],
+                      rotations[pose],
+                      translations_mm[pose],
+                      matrix,
+                      distortion,
+                      projected);
+    for (std::size_t k = 0; k < projected.size(); ++k) {
+      const cv::Point2f off = corners_px[pose][k] - projected[k];
+      result.residuals.push_back(
+          {{static_cast<double>(corners_px[pose][k].x),
+            static_cast<double>(corners_px[pose][k].y)},
+           {static_cast<double>(off.x), static_cast<double>(off.y)}});
+    }
+  }
+  return result;
 }
 
 }  // namespace nacre::calibrate

@@ -1,28 +1,17 @@
 #include "calibrate/radiometry.h"
 
+#include "calibrate/internal/pictures.h"
 #include "core/error.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <map>
-#include <numbers>
-#include <numeric>
-#include <optional>
 
 namespace nacre::calibrate {
 namespace {
 
 using acquire::Frame;
 using acquire::Target;
-
-double MeanCounts(const Frame& frame) {
-  std::uint64_t sum = 0;
-  for (const std::uint16_t count : frame.counts) {
-    sum += count;
-  }
-  return static_cast<double>(sum) / static_cast<double>(frame.counts.size());
-}
 
 // What a pair of pictures of the same scene says.
 struct Pair {
@@ -31,8 +20,8 @@ struct Pair {
 };
 
 Pair ComparePair(const Frame& first, const Frame& second) {
-  const double first_mean = MeanCounts(first);
-  const double second_mean = MeanCounts(second);
+  const double first_mean = internal::MeanCounts(first);
+  const double second_mean = internal::MeanCounts(second);
   const double shift = first_mean - second_mean;  // the light may have drifted
   double square_sum = 0;
   for (std::size_t k = 0; k < first.counts.size(); ++k) {
@@ -42,35 +31,6 @@ Pair ComparePair(const Frame& first, const Frame& second) {
   return {.mean_counts = 0.5 * (first_mean + second_mean),
           .variance_counts2 =
               square_sum / (2 * static_cast<double>(first.counts.size() - 1))};
-}
-
-// Numbers of the pictures of a target, in order.
-std::vector<std::int64_t> PicturesOf(const acquire::SessionReader& session,
-                                     Target target) {
-  std::vector<std::int64_t> numbers;
-  for (std::int64_t k = 0; k < session.schedule().grid_begin(); ++k) {
-    if (session.schedule()[k].target == target) {
-      numbers.push_back(k);
-    }
-  }
-  return numbers;
-}
-
-// The mean variance of consecutive dark pictures of one exposure. Dark current adds
-// shot noise of its own; it is part of the noise floor and is averaged into it.
-double DarkVariance(const acquire::SessionReader& session) {
-  double sum = 0;
-  int pair_count = 0;
-  std::optional<Frame> last;
-  for (const std::int64_t number : PicturesOf(session, Target::kNothing)) {
-    Frame frame = session.ReadFrame(number);
-    if (session.schedule()[number].repeat > 0) {
-      sum += ComparePair(*last, frame).variance_counts2;
-      ++pair_count;
-    }
-    last = std::move(frame);
-  }
-  return sum / pair_count;
 }
 
 // The count around which a saturated picture's pixels pile up, less six of its standard
@@ -87,34 +47,13 @@ double PileUp(const Frame& frame, double variance_counts2) {
 
 }  // namespace
 
-DarkLevel EstimateDark(const acquire::SessionReader& session) {
-  // Sums for a line through (exposure, mean counts).
-  double n = 0;
-  double sx = 0;
-  double sy = 0;
-  double sxx = 0;
-  double sxy = 0;
-  for (const std::int64_t number : PicturesOf(session, Target::kNothing)) {
-    const Frame frame = session.ReadFrame(number);
-    const double mean_counts = MeanCounts(frame);
-    n += 1;
-    sx += frame.exposure_us;
-    sy += mean_counts;
-    sxx += frame.exposure_us * frame.exposure_us;
-    sxy += frame.exposure_us * mean_counts;
-  }
-  const double determinant = n * sxx - sx * sx;
-  Expect(determinant > 0, "dark pictures at two exposures at least");
-  const double rate = (n * sxy - sx * sy) / determinant;
-  return {.offset_counts = (sy - rate * sx) / n, .rate_counts_per_us = rate};
-}
-
 PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
-                                      const DarkLevel& dark) {
-  const double dark_variance = DarkVariance(session);
+                                      const DarkResult& dark,
+                                      const Linearity& linearity) {
+  const double dark_variance = dark.variance_counts2;
   PhotonTransfer result;
   result.saturation_counts = (1 << session.manifest().camera.bit_depth) - 1;
-  std::vector<std::int64_t> numbers = PicturesOf(session, Target::kFlat);
+  std::vector<std::int64_t> numbers = internal::PicturesOf(session, Target::kFlat);
   // From dark to bright: a pair is judged by the ones before it.
   std::stable_sort(numbers.begin(), numbers.end(), [&](auto a, auto b) {
     return session.schedule()[a].exposure_us < session.schedule()[b].exposure_us;
@@ -123,12 +62,16 @@ PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
   // square: weights 1 / variance².
   double weighted_product = 0;
   double weighted_square = 0;
+  double pixels = 1;
   double significance = 0;  // of the clearest pair's shot noise
   for (std::size_t k = 0; k + 1 < numbers.size(); k += 2) {
     const Frame first = session.ReadFrame(numbers[k]);
     const Pair pair = ComparePair(first, session.ReadFrame(numbers[k + 1]));
-    const double signal = pair.mean_counts - dark.Counts(first.exposure_us);
-    const double excess = pair.variance_counts2 - dark_variance;
+    const double counts = pair.mean_counts - dark.level.Counts(first.exposure_us);
+    const double signal = linearity.Linear(counts);
+    const double slope = linearity.Slope(counts);
+    const double variance = slope * slope * pair.variance_counts2;
+    const double excess = variance - slope * slope * dark_variance;
     if (weighted_square > 0) {
       const double expected = signal * weighted_product / weighted_square;
       if (excess < 0.5 * expected) {
@@ -137,12 +80,13 @@ PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
         break;
       }
     }
-    const double weight = 1 / (pair.variance_counts2 * pair.variance_counts2);
+    const double weight = 1 / (variance * variance);
     weighted_product += weight * signal * excess;
     weighted_square += weight * signal * signal;
-    const double pixel_count = static_cast<double>(first.counts.size());
-    significance = std::max(
-        significance, excess / (pair.variance_counts2 * std::sqrt(2 / pixel_count)));
+    const auto pixel_count = static_cast<double>(first.counts.size());
+    pixels = pixel_count;
+    significance =
+        std::max(significance, excess / (variance * std::sqrt(2 / pixel_count)));
   }
   constexpr double kMinSignificance = 20;  // the gain to 5 %
   if (!(significance >= kMinSignificance && weighted_product > 0)) {
@@ -153,9 +97,22 @@ PhotonTransfer EstimatePhotonTransfer(const acquire::SessionReader& session,
                     session.folder().string()));
   }
   result.gain_electrons_per_count = weighted_square / weighted_product;
+  // The slope's variance is (2 / pixels) / Σ weight · signal².
+  result.gain_sigma_electrons_per_count = result.gain_electrons_per_count *
+                                          result.gain_electrons_per_count *
+                                          std::sqrt(2 / (pixels * weighted_square));
   constexpr double kRounding = 1.0 / 12;
-  result.read_noise_electrons = std::sqrt(std::max(dark_variance - kRounding, 0.0)) *
-                                result.gain_electrons_per_count;
+  const double read_variance = std::max(
+      dark_variance - kRounding - dark.row_noise_counts * dark.row_noise_counts, 0.0);
+  result.read_noise_electrons =
+      std::sqrt(read_variance) * result.gain_electrons_per_count;
+  if (read_variance > 0) {
+    result.read_noise_sigma_electrons =
+        result.read_noise_electrons *
+        std::hypot(
+            0.5 * dark.variance_sigma_counts2 / read_variance,
+            result.gain_sigma_electrons_per_count / result.gain_electrons_per_count);
+  }
   return result;
 }
 

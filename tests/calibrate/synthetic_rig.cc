@@ -194,7 +194,7 @@ class SyntheticRig final {
         rig_.targets.reference_reflectance / std::numbers::pi;
     const double width = 2 * truth_.spot_sigma_mm * truth_.spot_sigma_mm;
     std::vector<PointMm> centres;
-    for (std::size_t k = truth_.drop_a_spot ? 1 : 0; k < spots.size(); ++k) {
+    for (std::size_t k = truth_.dropped_spots; k < spots.size(); ++k) {
       centres.push_back(truth_.LaserAt(spots[k]));
     }
     return Average(Meet(camera), [&](const PointMm& p) {

@@ -36,7 +36,7 @@ struct SyntheticTruth {
   double board_counts_per_us = 0.2;
   std::vector<double> flux_scale_counts_mm2_sr_per_us{900, 500};
   double spot_sigma_mm = 0.4;
-  bool drop_a_spot = false;  ///< a speck of dirt on the reference target
+  std::size_t dropped_spots = 0;  ///< a speck of dirt on the reference target
   bool no_board = false;     ///< somebody forgot to put it there
 
   /// A scanner with pincushion, offset, rotation and unequal scales.

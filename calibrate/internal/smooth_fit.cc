@@ -1,0 +1,86 @@
+#include "calibrate/internal/smooth_fit.h"
+
+#include "core/error.h"
+
+#include <opencv2/core.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+namespace nacre::calibrate::internal {
+
+std::vector<Block> BlockMeans(const std::vector<float>& picture,
+                              int width,
+                              int side,
+                              const std::vector<bool>& excluded) {
+  const int height = static_cast<int>(std::ssize(picture)) / width;
+  std::vector<Block> blocks;
+  for (int top = 0; top < height; top += side) {
+    for (int left = 0; left < width; left += side) {
+      Block block;
+      double u = 0;
+      double v = 0;
+      for (int y = top; y < std::min(top + side, height); ++y) {
+        for (int x = left; x < std::min(left + side, width); ++x) {
+          const auto k = static_cast<std::size_t>(y * width + x);
+          if (excluded.empty() || !excluded[k]) {
+            block.mean += static_cast<double>(picture[k]);
+            u += 2 * (x + 0.5) / width - 1;
+            v += 2 * (y + 0.5) / height - 1;
+            ++block.count;
+          }
+        }
+      }
+      if (block.count > 0) {
+        block.mean /= block.count;
+        block.u = u / block.count;
+        block.v = v / block.count;
+        blocks.push_back(block);
+      }
+    }
+  }
+  return blocks;
+}
+
+SmoothField FitSmoothField(const std::vector<Block>& blocks, int degree) {
+  const int terms = (degree + 1) * (degree + 2) / 2;
+  Expect(std::ssize(blocks) > terms, "more blocks than terms");
+  cv::Mat_<double> normal(terms, terms, 0.0);
+  cv::Mat_<double> right(terms, 1, 0.0);
+  std::vector<double> term(static_cast<std::size_t>(terms));
+  for (const Block& block : blocks) {
+    std::size_t k = 0;
+    for (int d = 0; d <= degree; ++d) {
+      for (int j = 0; j <= d; ++j) {
+        term[k++] = std::pow(block.u, d - j) * std::pow(block.v, j);
+      }
+    }
+    for (int a = 0; a < terms; ++a) {
+      const double weighted = block.count * term[static_cast<std::size_t>(a)];
+      right(a, 0) += weighted * block.mean;
+      for (int b = 0; b < terms; ++b) {
+        normal(a, b) += weighted * term[static_cast<std::size_t>(b)];
+      }
+    }
+  }
+  cv::Mat_<double> solution;
+  cv::solve(normal, right, solution, cv::DECOMP_SVD);
+  SmoothField field{.degree = degree};
+  field.coefficients.assign(solution.begin(), solution.end());
+  const auto n = static_cast<double>(blocks.size());
+  field.sigma = ResidualRms(blocks, field) * std::sqrt(terms / (n - terms));
+  return field;
+}
+
+double ResidualRms(const std::vector<Block>& blocks, const SmoothField& field) {
+  double sum = 0;
+  double weight = 0;
+  for (const Block& block : blocks) {
+    const double residual = block.mean - field.At(block.u, block.v);
+    sum += block.count * residual * residual;
+    weight += block.count;
+  }
+  return std::sqrt(sum / weight);
+}
+
+}  // namespace nacre::calibrate::internal

@@ -1,0 +1,38 @@
+#pragma once
+
+#include "acquire/session.h"
+#include "calibrate/dark.h"
+#include "calibrate/glare.h"
+
+#include <memory>
+#include <vector>
+
+namespace nacre::calibrate {
+
+/// What turns a picture of the reference into count rates proportional to radiance, as
+/// far as it is known yet.
+class RatePictures {
+ public:
+  RatePictures(const DarkResult& dark, const Linearity& linearity)
+      : dark_(dark), linearity_(linearity) {}
+
+  void SetAmbient(const SmoothField& ambient, int width, int height);
+  void SetFlatField(const SmoothField& flat, int width, int height);
+  void SetGlare(const Glare& glare, int width, int height);
+
+  /// Counts per µs, hot pixels filled in, ambient light and glare taken off, divided by
+  /// the flat field.
+  std::vector<float> Rates(const acquire::Frame& frame) const;
+
+  const DarkResult& dark() const { return dark_; }
+  const Linearity& linearity() const { return linearity_; }
+
+ private:
+  const DarkResult& dark_;
+  Linearity linearity_;
+  std::vector<float> ambient_;
+  std::vector<float> flat_;
+  std::unique_ptr<GlareFilter> glare_;
+};
+
+}  // namespace nacre::calibrate
