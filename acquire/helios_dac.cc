@@ -7,6 +7,7 @@
 
 #include <chrono>
 #include <fmt/format.h>
+#include <thread>
 
 namespace nacre::acquire {
 namespace {
@@ -20,6 +21,9 @@ constexpr std::uint8_t kStartAtOnce = 1;
 constexpr std::uint8_t kPlayOnce = 2;  // never left out: a frame without it loops
 // After a stop the firmware drops frames for this long.
 constexpr std::chrono::milliseconds kDeafAfterStop{100};
+// Of a program that has just died: it has the DAC for a moment.
+constexpr std::chrono::milliseconds kWaitForWatchdog{1500};
+constexpr std::chrono::milliseconds kPause{20};
 
 std::vector<std::uint8_t> Encode(const LaserFrame& frame) {
   std::vector<std::uint8_t> bytes;
@@ -45,13 +49,19 @@ std::vector<std::uint8_t> Encode(const LaserFrame& frame) {
   return bytes;
 }
 
-std::unique_ptr<HeliosUsb> Open(const std::string& name) {
+std::string Wanted(const std::string& name) {
+  return name.empty() ? "the only laser DAC" : "laser DAC " + name;
+}
+
+// Empty if it isn't there; `others` says what is.
+std::unique_ptr<HeliosUsb> Seek(const std::string& name,
+                                std::string& others,
+                                bool& any_busy) {
   std::unique_ptr<HeliosUsb> found;
-  std::string others;
-  const std::string wanted = name.empty() ? "the only laser DAC" : "laser DAC " + name;
   for (const UsbPlace place : internal::FindHeliosPlaces()) {
     auto dac = std::make_unique<HeliosUsb>(place);
     if (!dac->Claim()) {
+      any_busy = true;
       others += fmt::format(
           " one at {}:{} that another program has,", place.bus, place.address);
       continue;
@@ -65,9 +75,8 @@ std::unique_ptr<HeliosUsb> Open(const std::string& name) {
     if (found) {
       throw DeviceError(
           fmt::format("{}: there are several, at USB {}:{} and {}:{}; unplug all but "
-                      "one and give it "
-                      "another name by nacre doctor --name-laser",
-                      wanted,
+                      "the one that is meant",
+                      Wanted(name),
                       found->place().bus,
                       found->place().address,
                       place.bus,
@@ -75,17 +84,30 @@ std::unique_ptr<HeliosUsb> Open(const std::string& name) {
     }
     found = std::move(dac);
   }
-  if (!found) {
+  return found;
+}
+
+std::unique_ptr<HeliosUsb> Open(const std::string& name) {
+  const auto give_up = Clock::now() + kWaitForWatchdog;
+  for (;;) {
+    std::string others;
+    bool any_busy = false;
+    if (auto found = Seek(name, others, any_busy)) {
+      return found;
+    }
+    if (any_busy && Clock::now() < give_up) {
+      std::this_thread::sleep_for(kPause);
+      continue;
+    }
     if (!others.empty()) {
       others.pop_back();
     }
     throw DeviceError(
         fmt::format("{}: not found; there is{}. See to its cable; nacre "
                     "doctor lists what is plugged in",
-                    wanted,
+                    Wanted(name),
                     others.empty() ? " none" : others));
   }
-  return found;
 }
 
 }  // namespace
@@ -129,6 +151,7 @@ struct HeliosDac::Parts {
     name = usb->Name();
     firmware = usb->Firmware();
     usb->SetShutter(false);
+    hears_from = Clock::now() + kDeafAfterStop;  // a watch-dog may just have stopped it
   }
   ~Parts() {
     try {

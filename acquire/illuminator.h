@@ -41,8 +41,9 @@ class Illuminator {
   /// if the device doesn't come back.
   virtual void AwaitSteady() {}
 
-  /// How often the light wasn't as asked for, so far. A picture during whose exposure
-  /// that grew must be taken again.
+  /// How often the light wasn't as asked for, so far. To be asked for before
+  /// AwaitSteady() and after the exposure: a picture between which it grew must be taken
+  /// again.
   virtual std::int64_t Interruptions() const { return 0; }
 };
 

@@ -5,9 +5,9 @@ if(NACRE_WITH_USB_TWINS AND TARGET nacre_helios)
   find_package(PkgConfig REQUIRED)
   pkg_check_modules(umockdev REQUIRED IMPORTED_TARGET umockdev-1.0)
   add_library(nacre_usb_twins STATIC
-    helios_dac_twin.cc internal/helios_firmware.cc internal/usb_port.cc)
+    emulated_rig.cc helios_dac_twin.cc internal/helios_firmware.cc internal/usb_port.cc)
   add_library(nacre::usb_twins ALIAS nacre_usb_twins)
   target_include_directories(nacre_usb_twins PUBLIC ${PROJECT_SOURCE_DIR})
   target_link_libraries(nacre_usb_twins
-    PUBLIC nacre::laser PRIVATE PkgConfig::umockdev nacre_flags)
+    PUBLIC nacre::laser nacre::rigs PRIVATE PkgConfig::umockdev nacre_flags)
 endif()

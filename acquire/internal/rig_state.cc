@@ -77,8 +77,9 @@ PackedFrame RigState::Take(std::int64_t number, CaptureSummary& summary) {
   int light_failures = 0;
   for (int attempt = 1; attempt <= kAttempts;) {
     const double exposure_us = Set(number);
-    devices_.illuminator.AwaitSteady();
+    // In this order: an interruption that is found by counting isn't waited for.
     const std::int64_t interruptions = devices_.illuminator.Interruptions();
+    devices_.illuminator.AwaitSteady();
     const auto timeout =
         kTimeoutBeyondExposure +
         std::chrono::milliseconds(static_cast<std::int64_t>(exposure_us / 1000));

@@ -188,6 +188,10 @@ struct UsbPort::Parts : std::enable_shared_from_this<UsbPort::Parts> {
   void Submit(UMockdevIoctlClient* client, UMockdevIoctlData* argument) {
     UMockdevIoctlData* data =
         umockdev_ioctl_data_resolve(argument, 0, sizeof(usbdevfs_urb), nullptr);
+    if (data == nullptr) {  // its program has just died
+      Answer(client, -1, EFAULT);
+      return;
+    }
     UMockdevIoctlData* buffer =
         umockdev_ioctl_data_resolve(data,
                                     offsetof(usbdevfs_urb, buffer),
@@ -222,6 +226,10 @@ struct UsbPort::Parts : std::enable_shared_from_this<UsbPort::Parts> {
     Gate();
     UMockdevIoctlData* pointer =
         umockdev_ioctl_data_resolve(argument, 0, sizeof(void*), nullptr);
+    if (pointer == nullptr) {
+      Answer(client, -1, EFAULT);
+      return;
+    }
     umockdev_ioctl_data_set_ptr(pointer, 0, data);
     g_object_unref(pointer);
     Answer(client, 0);
@@ -284,6 +292,9 @@ struct UsbPort::Parts : std::enable_shared_from_this<UsbPort::Parts> {
       case USBDEVFS_SETINTERFACE: {
         UMockdevIoctlData* data = umockdev_ioctl_data_resolve(
             argument, 0, sizeof(usbdevfs_setinterface), nullptr);
+        if (data == nullptr) {
+          return Answer(client, -1, EFAULT);
+        }
         alternate = static_cast<int>(
             reinterpret_cast<usbdevfs_setinterface*>(data->data)->altsetting);
         g_object_unref(data);

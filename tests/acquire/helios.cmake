@@ -4,6 +4,15 @@ nacre_test(laser
     laser_safety_test.cc
   LIBRARIES
     nacre::laser rapidcheck)
+if(TARGET nacre_acquire AND NACRE_WITH_ARAVIS)
+  nacre_test(rig_light
+    SOURCES
+      rig_light_test.cc
+    LIBRARIES
+      nacre::acquire)
+  target_compile_definitions(rig_light_tests PRIVATE
+    NACRE_RIGS_FOLDER="${PROJECT_SOURCE_DIR}/rigs")
+endif()
 if(TARGET nacre_usb_twins)
   nacre_test(helios
     SOURCES
