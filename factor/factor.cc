@@ -5,6 +5,7 @@
 #include "core/provenance.h"
 #include "factor/internal/bilinear_data.h"
 #include "factor/internal/method.h"
+#include "factor/internal/reciprocal_data.h"
 #include "factor/internal/terms_search.h"
 
 #include <algorithm>
@@ -27,9 +28,11 @@ std::int64_t WorkingBytes(const reconstruct::RdHeader& header,
                           const FactorOptions& options) {
   const auto channels = static_cast<double>(header.channels.size());
   const auto window = static_cast<double>(header.WindowSize());
-  const double method_bytes = options.method == "bilinear"
-                                  ? internal::PairBytes(header)
-                                  : 8 * window * window * channels * options.clusters;
+  const double method_bytes =
+      options.method == "bilinear" ? internal::PairBytes(header)
+      : options.method == "reciprocal"
+          ? internal::ReciprocalBytes(header, internal::LimitsOf(options))
+          : 8 * window * window * channels * options.clusters;
   const double bytes = method_bytes +
                        (8 + 5) * window * channels * internal::kBlockRows +
                        3 * 8 * window * options.sample_rows * channels;
@@ -98,7 +101,8 @@ const std::vector<std::pair<std::string, MakeMethod>>& Methods() {
   static const std::vector<std::pair<std::string, MakeMethod>> methods{
       {"log-svd", internal::MakeSvdMethod},
       {"svd", internal::MakeSvdMethod},
-      {"bilinear", internal::MakeBilinearMethod}};
+      {"bilinear", internal::MakeBilinearMethod},
+      {"reciprocal", internal::MakeReciprocalMethod}};
   return methods;
 }
 

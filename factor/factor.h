@@ -25,13 +25,16 @@ struct FactorOptions {
   int fill_rounds = 2;
   double bits = 0;
   double tail_weight = 1;
+  int taps = 3;
+  double totals = 0.01;
+  double memory_mb = 1000;
 
   int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
   std::uint64_t seed = 1;  ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
-    visit("method", self.method, Range{}, "log-svd, svd or bilinear");
+    visit("method", self.method, Range{}, "log-svd, svd, bilinear or reciprocal");
     visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
     visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
     visit("bytes",
@@ -61,8 +64,23 @@ struct FactorOptions {
           "to the errors");
     visit("tail_weight",
           self.tail_weight,
+          Range{0, 2},
+          "of bilinear, nmf and reciprocal: 0 minimises the error in R_d, 1 that over the "
+          "root of R_d, 2 that over R_d");
+    visit("taps",
+          self.taps,
+          Range{1, 4},
+          "of reciprocal, where maps are looked at between two points: 1 at the points "
+          "alone, 2 in the middle, 3 at the quarters, 4 at the eighths too");
+    visit("totals",
+          self.totals,
           Range{0, 1},
-          "of bilinear: 0 minimises the error in R_d, 1 that over the root of R_d");
+          "of reciprocal: slices' totals stay within this of the measured ones; 1: as "
+          "they come");
+    visit("memory_mb",
+          self.memory_mb,
+          Range{1, 1e6},
+          "of reciprocal: for the pairs that maps are fitted to; less takes fewer");
   }
 };
 

@@ -2,6 +2,8 @@
 
 #include "core/error.h"
 #include "factor/internal/bilinear.h"
+#include "factor/internal/reciprocal.h"
+#include "factor/internal/reciprocal_taps.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +17,9 @@ namespace {
 double Undo(const Material& material, int channel, double s) {
   if (material.transform == Transform::kLinear) {
     return s;
+  }
+  if (material.transform == Transform::kSqrt) {
+    return s * std::abs(s);
   }
   const auto c = static_cast<std::size_t>(channel);
   // A (exp(s) − B) as A B expm1(s − ln B), which stays exact towards R_d = 0.
@@ -55,14 +60,46 @@ class Checker {
 }  // namespace
 
 const char* Name(Transform transform) {
-  return transform == Transform::kLog ? "log" : "linear";
+  switch (transform) {
+    case Transform::kSqrt:
+      return "sqrt";
+    case Transform::kLog:
+      return "log";
+    case Transform::kLinear:
+      break;
+  }
+  return "linear";
 }
 
 const char* Name(Form form) {
-  return form == Form::kBilinear ? "bilinear" : "sum";
+  switch (form) {
+    case Form::kBilinear:
+      return "bilinear";
+    case Form::kReciprocal:
+      return "reciprocal";
+    case Form::kSum:
+      break;
+  }
+  return "sum";
+}
+
+int Material::KernelCount() const {
+  switch (form) {
+    case Form::kBilinear:
+      return terms * (terms + 1) / 2;
+    case Form::kReciprocal:
+      return internal::ReciprocalKernelCount(terms, taps);
+    case Form::kSum:
+      break;
+  }
+  return terms;
 }
 
 float Material::Evaluate(int channel, int i, int j, int u, int v) const {
+  if (form == Form::kReciprocal) {
+    return internal::ReciprocalCell(*this, channel, {i, j}, {u, v}) *
+           internal::PairScale(*this, channel, {i, j}, {u, v});
+  }
   const std::int64_t point = std::int64_t{j} * points_x + i;
   const float scale =
       row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
@@ -81,6 +118,14 @@ float Material::Evaluate(int channel, int i, int j, int u, int v) const {
 
 void Material::EvaluateWindow(int channel, int i, int j, float* window) const {
   EvaluateTerms(channel, i, j, terms, window);
+  if (form == Form::kReciprocal) {
+    for (int v = 0; v < core; ++v) {
+      for (int u = 0; u < core; ++u) {
+        window[v * core + u] *= internal::PairScale(*this, channel, {i, j}, {u, v});
+      }
+    }
+    return;
+  }
   const std::int64_t point = std::int64_t{j} * points_x + i;
   const float scale =
       row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
@@ -93,6 +138,10 @@ void Material::EvaluateTerms(
     int channel, int i, int j, int term_count, float* window) const {
   if (form == Form::kBilinear) {
     internal::BilinearWindow(*this, channel, {i, j}, window);
+    return;
+  }
+  if (form == Form::kReciprocal) {
+    internal::ReciprocalWindows(*this, {i, j}, channel, 1, window);
     return;
   }
   const std::int64_t point = std::int64_t{j} * points_x + i;
@@ -140,15 +189,19 @@ void Validate(const Material& m, const std::string& origin) {
   }
   check.Require(
       m.margin >= 0 && m.margin <= m.core, "margin", fmt::format("{}", m.margin));
-  if (m.form == Form::kBilinear) {
-    check.Require(m.cluster_count == 1, "cluster_count", "a bilinear model has one");
+  check.Require(
+      m.taps >= 1 && m.taps <= internal::kMostTaps, "taps", fmt::format("{}", m.taps));
+  if (m.form != Form::kSum) {
     check.Require(
-        m.transform == Transform::kLinear, "transform", "a bilinear model has none");
+        m.cluster_count == 1, "cluster_count", "a model with shared maps has one");
+    check.Require(m.transform == Transform::kLinear,
+                  "transform",
+                  "a model with shared maps has none");
   }
   const std::int64_t maps = std::int64_t{m.MapSets()} * m.terms;
   const std::int64_t kernels = channels * m.cluster_count * m.KernelCount();
   check.Size(m.f, maps * m.MapSize(), "f");
-  check.Size(m.h, kernels * m.WindowSize(), "h");
+  check.Size(m.h, kernels * m.KernelSize(), "h");
   check.Size(m.steps.f, m.steps.empty() ? 0 : maps, "steps of f");
   check.Size(m.steps.h, m.steps.empty() ? 0 : channels, "steps of h");
   if (!m.steps.empty()) {

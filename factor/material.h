@@ -11,6 +11,7 @@ namespace nacre::factor {
 /// How a sum of terms becomes R_d.
 enum class Transform {
   kLinear,  ///< R_d = Σ_j f_j h_j
+  kSqrt,    ///< R_d = s |s|, s = Σ_j f_j h_j
   kLog,     ///< R_d = A (exp(Σ_j f_j h_j) − B), the thesis' ln(R'_d/A + B) undone
 };
 
@@ -26,8 +27,10 @@ struct TermsError {
 
 /// How maps f and kernels h make R_d.
 enum class Form {
-  kSum,       ///< Σ_j f_j(x_i) h_j(d), maps and kernels a channel
-  kBilinear,  ///< Σ_jk f_j(x_i) h_jk(d) f_k(x_o), maps shared by all channels
+  kSum,         ///< Σ_j f_j(x_i) h_j(d), maps and kernels a channel
+  kBilinear,    ///< Σ_jk f_j(x_i) h_jk(d) f_k(x_o), maps shared by all channels
+  kReciprocal,  ///< A exp of a symmetric polynomial of the maps at both ends and in
+                ///< between, maps shared by all channels
 };
 
 const char* Name(Form form);
@@ -42,10 +45,15 @@ struct Steps {
   friend bool operator==(const Steps&, const Steps&) = default;
 };
 
-/// A factored dataset. R'_d(x_i, d) of channel c is, for the two forms,
+/// A factored dataset. R'_d(x_i, d) of channel c is, for the three forms,
 ///   row_scale_c(x_i) · max(0, T_c(Σ_j f_cj(x_i) h_ckj(d))),  k = cluster(x_i),
 ///   max(0, Σ_jk f_j(x_i) h_cjk(d) f_k(x_o)),  h_cjk(d) = h_ckj(−d),  x_o = x_i + d.
-/// The second is reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d).
+///   row_scale_c(x_i) row_scale_c(x_o) A_c exp(h_c0(d) + Σ_j Σ_t h_cjt(d) φ_t[f_j]
+///     + Σ_{j ≤ k} h_cjk(d) (f_j(x_i) f_k(x_o) + f_k(x_i) f_j(x_o))),  h(−d) = h(d),
+/// with taps φ_0[f] = f(x_i) + f(x_o), φ_1[f] = 2 f(middle), φ_2[f] the sum of f at the
+/// quarters of the way, φ_3[f] half of that at its odd eighths, the exponent being cut
+/// at ln 3. The last two are
+/// reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d); the last is positive.
 /// Indices, units and orientation are those of reconstruct::RdHeader.
 struct Material {
   int points_x = 0;
@@ -54,19 +62,21 @@ struct Material {
   double pitch_mm = 0;
   double eta = 1;
   std::vector<std::string> channels;
-  std::string method;  ///< "log-svd", "svd", "bilinear"
+  std::string method;  ///< the option of that name, as "log-svd"
   Form form = Form::kSum;
   Transform transform = Transform::kLinear;  ///< kBilinear: linear
   int terms = 0;
   int cluster_count = 1;
-  int margin = 0;  ///< maps go on for so many points beyond the grid (kBilinear)
+  int margin = 0;  ///< shared maps go on for so many points beyond the grid
+  int taps = 1;    ///< 1 to 4 (kReciprocal)
 
-  std::vector<double> a;  ///< A a channel (kLog)
+  std::vector<double> a;  ///< A a channel (kLog, kReciprocal)
   std::vector<double> b;  ///< B a channel (kLog)
-  /// [channel][term][j][i]; kBilinear: [term][j][i], with margin on all sides.
+  /// [channel][term][j][i]; shared: [term][j][i], with margin on all sides.
   std::vector<float> f;
   /// [channel][cluster][term][v][u]; kBilinear: [channel][pair][v][u], pairs being
-  /// (0, 0), (0, 1), …, (1, 1), (1, 2), …
+  /// (0, 0), (0, 1), …, (1, 1), (1, 2), …; kReciprocal: [channel][kernel][v][u], the
+  /// constant, then [tap][term], then pairs, of rows up to the middle one.
   std::vector<float> h;
   std::vector<std::uint8_t> cluster;  ///< [j][i], all 0 without clustering
   std::vector<float> row_scale;  ///< [channel][j][i]; makes each slice's total exact
@@ -85,11 +95,13 @@ struct Material {
   std::int64_t MapSize() const { return std::int64_t{MapWidth()} * MapHeight(); }
   /// Sets of factor maps: one a channel, or one for all.
   int MapSets() const {
-    return form == Form::kBilinear ? 1 : static_cast<int>(channels.size());
+    return form == Form::kSum ? static_cast<int>(channels.size()) : 1;
   }
   /// Kernels of a channel and cluster.
-  int KernelCount() const {
-    return form == Form::kBilinear ? terms * (terms + 1) / 2 : terms;
+  int KernelCount() const;
+  /// Values of a kernel: those of a window, or of its rows up to the middle one.
+  std::int64_t KernelSize() const {
+    return std::int64_t{core} * (form == Form::kReciprocal ? (core + 1) / 2 : core);
   }
   const float* FactorMap(int channel, int term) const {
     const int set = MapSets() == 1 ? 0 : channel;
@@ -98,7 +110,7 @@ struct Material {
   const float* Kernel(int channel, int cluster_index, int n) const {
     return &h[static_cast<std::size_t>(
         ((std::int64_t{channel} * cluster_count + cluster_index) * KernelCount() + n) *
-        WindowSize())];
+        KernelSize())];
   }
 
   /// R'_d in mm⁻² at grid point (i, j) and window cell (u, v). The simple version.

@@ -72,22 +72,23 @@ class AttributeReader {
 
 Form ParseForm(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("form");
-  for (const Form form : {Form::kSum, Form::kBilinear}) {
+  for (const Form form : {Form::kSum, Form::kBilinear, Form::kReciprocal}) {
     if (text == Name(form)) {
       return form;
     }
   }
-  throw attributes.At("form", "is '" + text + "', neither 'sum' nor 'bilinear'");
+  throw attributes.At("form",
+                      "is '" + text + "', none of 'sum', 'bilinear', 'reciprocal'");
 }
 
 Transform ParseTransform(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("transform");
-  for (const Transform transform : {Transform::kLinear, Transform::kLog}) {
+  for (const Transform transform : {Transform::kLinear, Transform::kSqrt, Transform::kLog}) {
     if (text == Name(transform)) {
       return transform;
     }
   }
-  throw attributes.At("transform", "is '" + text + "', neither 'linear' nor 'log'");
+  throw attributes.At("transform", "is '" + text + "', none of 'linear', 'sqrt' and 'log'");
 }
 
 void ReadErrors(const AttributeReader& attributes, Material& m) {
@@ -136,9 +137,12 @@ Material ReadAttributes(const AttributeReader& attributes) {
           "is " + attributes.Text("margin") + ", not a count up to the window's");
     }
     m.margin = static_cast<int>(margin);
-    if (m.form == Form::kBilinear && m.terms > 1024) {
+    if (m.form != Form::kSum && m.terms > 1024) {
       throw attributes.At("terms", "is " + attributes.Text("terms") + ", out of range");
     }
+  }
+  if (attributes.Text("version") == internal::kVersion) {
+    m.taps = attributes.Integer("taps");
   }
   m.provenance = attributes.Text("provenance");
   const Json channels = attributes.List("channels");
@@ -244,10 +248,11 @@ Material ReadMaterial(const std::filesystem::path& path) {
   }
   const AttributeReader attributes(found, path.string());
   const std::string& version = attributes.Text("version");
-  if (version != internal::kVersion && version != internal::kOldVersion) {
+  if (version != internal::kVersion && version != internal::kVersionWithoutTaps &&
+      version != internal::kOldVersion) {
     throw attributes.At("version",
                         "is " + version + "; this build reads " +
-                            internal::kOldVersion + " and " + internal::kVersion +
+                            internal::kOldVersion + " to " + internal::kVersion +
                             ": a newer nacre is needed");
   }
   Material m = ReadAttributes(attributes);

@@ -62,6 +62,7 @@ ExrAttributes AttributesOf(const Material& m) {
           {"nacre.method", m.method},
           {"nacre.form", Name(m.form)},
           {"nacre.margin", std::to_string(m.margin)},
+          {"nacre.taps", std::to_string(m.taps)},
           {"nacre.transform", Name(m.transform)},
           {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},
           {"nacre.core", std::to_string(m.core)},

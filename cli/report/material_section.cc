@@ -121,10 +121,26 @@ std::string Sheet(const std::vector<std::string>& rows,
          ColorScale("− largest magnitude", "+ largest magnitude", true);
 }
 
-// "1", or "1,2" for the kernel that joins two maps.
+// "1", or "1,2" for the kernel that joins two maps; of a reciprocal material "0" for
+// the constant, then "1" for the ends' taps, "1′", "1″" for those in between, then
+// pairs.
 std::string KernelName(const Material& m, int n) {
   if (m.form == factor::Form::kSum) {
     return std::to_string(n + 1);
+  }
+  if (m.form == factor::Form::kReciprocal) {
+    if (n == 0) {
+      return "0";
+    }
+    const int tap = (n - 1) / m.terms;
+    if (tap < m.taps) {
+      std::string name = std::to_string((n - 1) % m.terms + 1);
+      for (int mark = 0; mark < tap; ++mark) {
+        name += "′";
+      }
+      return name;
+    }
+    n -= 1 + m.taps * m.terms;
   }
   int first = 0;
   while (n >= m.terms - first) {
@@ -139,7 +155,7 @@ std::string FirstOf(int count) {
 }
 
 std::string SheetFigures(const Material& m) {
-  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const auto kernel_size = static_cast<std::size_t>(m.KernelSize());
   const auto map_size = static_cast<std::size_t>(m.MapSize());
   const bool is_sum = m.form == factor::Form::kSum;
   const std::string kernels = Sheet(
@@ -147,7 +163,9 @@ std::string SheetFigures(const Material& m) {
       m.KernelCount(),
       [&](int n) { return "<i>h</i><sub>" + KernelName(m, n) + "</sub>"; },
       [&](int c, int n) {
-        return Plane{m.core, m.core, {m.Kernel(c, 0, n), window}};
+        return Plane{m.core,
+                     static_cast<int>(m.KernelSize() / m.core),
+                     {m.Kernel(c, 0, n), kernel_size}};
       });
   const std::string maps = Sheet(
       is_sum ? m.channels : std::vector<std::string>{"all"},
@@ -185,6 +203,17 @@ std::string TransformTable(const Material& m) {
            "h<sub>jk</sub>(d) f<sub>k</sub>(x<sub>o</sub>), h<sub>jk</sub>(d) = "
            "h<sub>kj</sub>(−d): the same from x<sub>i</sub> to x<sub>o</sub> and back, "
            "to the last bit.</p>";
+  }
+  if (m.form == factor::Form::kReciprocal) {
+    return "<p>R<sub>d</sub> = A exp(h<sub>0</sub>(d) + Σ<sub>jt</sub> "
+           "h<sub>jt</sub>(d) "
+           "φ<sub>t</sub>[f<sub>j</sub>] + Σ<sub>jk</sub> h<sub>jk</sub>(d) "
+           "f<sub>j</sub>(x<sub>i</sub>) f<sub>k</sub>(x<sub>o</sub>)), h(d) = h(−d), "
+           "φ "
+           "being the maps' values at both ends and at places in between: positive, "
+           "and "
+           "the same from x<sub>i</sub> to x<sub>o</sub> and back, to the last "
+           "bit.</p>";
   }
   if (m.transform != factor::Transform::kLog) {
     return "<p>R<sub>d</sub> = Σ<sub>j</sub> f<sub>j</sub> h<sub>j</sub>, a channel at "

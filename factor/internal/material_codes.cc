@@ -42,7 +42,7 @@ void ToValues(std::vector<float>& codes,
 }
 
 std::int64_t KernelValues(const Material& m) {
-  return m.WindowSize() * m.KernelCount() * m.cluster_count;
+  return m.KernelSize() * m.KernelCount() * m.cluster_count;
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ const std::vector<std::string>& SharedChannel() {
 }
 
 const std::vector<std::string>& MapChannels(const Material& m) {
-  return m.form == Form::kBilinear ? SharedChannel() : m.channels;
+  return m.form == Form::kSum ? m.channels : SharedChannel();
 }
 
 Layout LayoutOf(const Material& m) {
@@ -18,7 +18,11 @@ Layout LayoutOf(const Material& m) {
   return {
       {m.points_x, m.points_y, 1, 1, n},
       {m.MapWidth(), m.MapHeight(), m.terms, 1, static_cast<std::size_t>(m.MapSets())},
-      {m.core, m.core, m.KernelCount(), m.cluster_count, n},
+      {m.core,
+       static_cast<int>(m.KernelSize() / m.core),
+       m.KernelCount(),
+       m.cluster_count,
+       n},
       {m.points_x, m.points_y, 1, 1, 1}};
 }
 

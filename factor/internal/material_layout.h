@@ -6,6 +6,7 @@
 ///   row_scale  points_x × points_y
 ///   factors    (terms · map width) × map height        maps f_j side by side
 ///   kernels    (kernels · core) × (clusters · core)    kernels h_j, a cluster a row
+///              (reciprocal: (core + 1) / 2 rows, the rest being their mirror image)
 ///   cluster    points_x × points_y, channel Y
 /// Where the material has steps, values are whole numbers instead, times a step. Maps
 /// that all channels share are channel Y.
@@ -20,7 +21,9 @@
 namespace nacre::factor::internal {
 
 inline constexpr const char* kFormat = "material";
-inline constexpr const char* kVersion = "2";
+inline constexpr const char* kVersion = "3";
+/// Without taps and the form they are of.
+inline constexpr const char* kVersionWithoutTaps = "2";
 /// Sums of floats: no form, margin or steps.
 inline constexpr const char* kOldVersion = "1";
 

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "factor/internal/material_codes.h"
+#include "factor/internal/reciprocal.h"
 #include "reconstruct/error_figures.h"
 
 #include <algorithm>
@@ -55,17 +56,21 @@ void ScaleSlice(std::span<const float> rd,
                 Material& m,
                 std::span<float> window) {
   const auto c = static_cast<int>(channel);
-  m.EvaluateTerms(c,
-                  static_cast<int>(point % m.points_x),
-                  static_cast<int>(point / m.points_x),
-                  m.terms,
-                  window.data());
+  const GridIndex index{static_cast<int>(point % m.points_x),
+                        static_cast<int>(point / m.points_x)};
+  if (m.form == Form::kReciprocal) {
+    m.EvaluateWindow(c, index.x, index.y, window.data());
+  } else {
+    m.EvaluateTerms(c, index.x, index.y, m.terms, window.data());
+  }
   const auto at = static_cast<std::size_t>(std::int64_t{c} * m.PointCount() + point);
   if (m.form == Form::kSum) {
     m.row_scale[at] = RoundScale(TotalScale(rd, valid, window), m.steps.row_scale);
   }
-  for (float& value : window) {
-    value *= m.row_scale[at];
+  if (m.form != Form::kReciprocal) {
+    for (float& value : window) {
+      value *= m.row_scale[at];
+    }
   }
   const double total = std::accumulate(window.begin(), window.end(), 0.0);
   m.albedo[at] = RoundAlbedo(total * m.pitch_mm * m.pitch_mm, !m.steps.empty());

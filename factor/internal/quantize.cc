@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "factor/internal/measure.h"
+#include "factor/internal/reciprocal_taps.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +16,7 @@ constexpr double kLeastBits = 4;
 constexpr double kMostBits = 16;
 constexpr double kFloatBits = 32;
 constexpr double kKernelFinesse = 32;
+constexpr double kLogKernelFinesse = 4;
 constexpr float kMostCode = 0x1p22F;      // either way; floats hold four times as much
 constexpr double kLeastStep = 1e-37;      // floats lose digits below
 constexpr float kFinestScale = 0x1p-20F;  // steps of row_scale
@@ -25,6 +27,7 @@ double Gain(const Job& job, const Material& m, std::size_t channel) {
   if (m.transform == Transform::kLinear) {
     return 1;
   }
+  const bool is_root = m.transform == Transform::kSqrt;
   const double offset = m.a[channel] * m.b[channel];
   const auto window = static_cast<std::size_t>(m.WindowSize());
   double sum = 0;
@@ -32,15 +35,50 @@ double Gain(const Job& job, const Material& m, std::size_t channel) {
     const float* rd =
         &job.sample.dataset.rd[(row * m.channels.size() + channel) * window];
     for (std::size_t cell = 0; cell < window; ++cell) {
-      const double slope = std::max(0.0, static_cast<double>(rd[cell])) + offset;
+      const double value = std::max(0.0, static_cast<double>(rd[cell]));
+      const double slope = is_root ? 2 * std::sqrt(value) : value + offset;
       sum += slope * slope;
     }
   }
   return std::sqrt(sum / static_cast<double>(job.sample.rows.size() * window));
 }
 
+// How much a unit of each map of a reciprocal material matters: rms of what it changes
+// the logarithm of R_d by, weighted by R_d's size at an offset.
+std::vector<double> ReciprocalMapWeights(const Material& m) {
+  std::vector<double> squares(static_cast<std::size_t>(m.terms), 0.0);
+  double all = 0;
+  for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
+    for (std::int64_t cell = 0; cell < m.KernelSize(); ++cell) {
+      const auto kernel = [&](int n) {
+        return static_cast<double>(m.Kernel(c, 0, n)[cell]);
+      };
+      const double weight = std::exp(std::clamp(kernel(0), -20.0, 1.0));
+      all += weight;
+      for (int j = 0; j < m.terms; ++j) {
+        double sum = 0;
+        for (int tap = 0; tap < m.taps; ++tap) {
+          sum += std::pow(2 * kernel(TapKernel(m.terms, tap, j)), 2);
+        }
+        for (int k = 0; k < m.terms; ++k) {
+          const int n = PairKernel(m.terms, m.taps, std::min(j, k), std::max(j, k));
+          sum += std::pow(2 * kernel(n), 2);
+        }
+        squares[static_cast<std::size_t>(j)] += weight * sum;
+      }
+    }
+  }
+  for (double& square : squares) {
+    square = std::sqrt(square / all);
+  }
+  return squares;
+}
+
 // How much a unit of each map matters: the norm of the kernels it goes with, in R_d.
 std::vector<double> MapWeights(const Material& m, const std::vector<double>& gains) {
+  if (m.form == Form::kReciprocal) {
+    return ReciprocalMapWeights(m);
+  }
   std::vector<double> squares(static_cast<std::size_t>(m.MapSets() * m.terms), 0.0);
   const auto add = [&](int channel, int term, const float* kernel) {
     const double gain = gains[static_cast<std::size_t>(channel)];
@@ -132,8 +170,11 @@ class Rounding {
       for (const float value : kernels) {
         largest = std::max(largest, static_cast<double>(std::abs(value)));
       }
-      const double wanted = delta / (gains_[c] * kKernelFinesse *
-                                     std::sqrt(static_cast<double>(m.WindowSize())));
+      const double finesse =
+          m.form == Form::kReciprocal
+              ? kLogKernelFinesse
+              : kKernelFinesse * std::sqrt(static_cast<double>(m.WindowSize()));
+      const double wanted = delta / (gains_[c] * finesse);
       const double step =
           std::max(wanted, 1.0001 * largest / static_cast<double>(kMostCode));
       m.steps.h.push_back(static_cast<float>(step));

@@ -16,7 +16,8 @@ class MemorySource : public SliceSource {
     reconstruct::Validate(dataset.header, "dataset in memory");
     const auto expected = static_cast<std::size_t>(dataset.header.PointCount() *
                                                    dataset.header.SliceSize());
-    if (dataset.rd.size() != expected || dataset.valid.size() != expected) {
+    if (dataset.rd.size() != expected || dataset.valid.size() != expected ||
+        (!dataset.sigma.empty() && dataset.sigma.size() != expected)) {
       throw BadData(fmt::format(
           "dataset in memory: {} values and {} validity flags where its header says {}",
           dataset.rd.size(),
@@ -29,7 +30,11 @@ class MemorySource : public SliceSource {
 
   SliceBlock Read(std::int64_t first, std::int64_t count) override {
     const auto offset = static_cast<std::size_t>(first * dataset_.header.SliceSize());
-    return {first, count, &dataset_.rd[offset], &dataset_.valid[offset]};
+    return {first,
+            count,
+            &dataset_.rd[offset],
+            &dataset_.valid[offset],
+            dataset_.sigma.empty() ? nullptr : &dataset_.sigma[offset]};
   }
 
  private:
@@ -46,6 +51,7 @@ class FileSource : public SliceSource {
     const std::int64_t size = header().SliceSize();
     rd_.resize(static_cast<std::size_t>(count * size));
     valid_.resize(rd_.size());
+    sigma_.resize(rd_.size());
     for (std::int64_t s = 0; s < count; ++s) {
       const std::int64_t slice_index = first + s;
       const reconstruct::RdSlice slice =
@@ -53,14 +59,16 @@ class FileSource : public SliceSource {
                             static_cast<int>(slice_index / header().points_x));
       std::copy(slice.rd.begin(), slice.rd.end(), rd_.begin() + s * size);
       std::copy(slice.valid.begin(), slice.valid.end(), valid_.begin() + s * size);
+      std::copy(slice.sigma.begin(), slice.sigma.end(), sigma_.begin() + s * size);
     }
-    return {first, count, rd_.data(), valid_.data()};
+    return {first, count, rd_.data(), valid_.data(), sigma_.data()};
   }
 
  private:
   reconstruct::RdReader& reader_;
   std::vector<float> rd_;
   std::vector<std::uint8_t> valid_;
+  std::vector<float> sigma_;
 };
 
 }  // namespace

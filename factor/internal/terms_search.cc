@@ -2,6 +2,7 @@
 
 #include "factor/internal/measure.h"
 #include "factor/internal/quantize.h"
+#include "factor/internal/reciprocal_totals.h"
 
 #include <fmt/format.h>
 #include <map>
@@ -21,6 +22,9 @@ class TermsSearch {
     }
     Factorization made{method_.Make(terms), {}};
     const Quantization rounding = Quantize(job_, job_.options.bits, made.material);
+    if (made.material.form == Form::kReciprocal && job_.options.totals < 1) {
+      BalanceTotals(job_, job_.options.totals, made.material);
+    }
     Measure(job_, made.material, made.summary);
     made.summary.bits = rounding.bits;
     made.summary.added_l2 = rounding.added_l2;

@@ -151,7 +151,7 @@ TEST(MaterialFile, BadAttributesAndPartsAreNamed) {
       {"nacre.core", "5", "part 'kernels'"},
       {"nacre.points", "5", "nacre.points is '5', not two counts"},
       {"nacre.points", "5 0", "out of range"},
-      {"nacre.transform", "cubic", "neither 'linear' nor 'log'"},
+      {"nacre.transform", "cubic", "none of 'linear', 'sqrt' and 'log'"},
       {"nacre.a", "[\"1\", \"2\"]", "a: 2 values where 3 are expected"},
       {"nacre.b", "[\"1\", \"-2\", \"1\"]", "b: -2"},
       {"nacre.b", "[1, 2, 3]", "a number in quotes"},
@@ -215,7 +215,7 @@ TEST(MaterialFile, OtherFilesAreNamed) {
   EXPECT_THAT(ReadComplaint(folder / "picture.exr"), HasSubstr("is not a material"));
   WriteMaterial(folder / "m.nacre.exr", MakeMaterial(9));
   std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
-  parts[0].attributes["nacre.version"] = "3";
+  parts[0].attributes["nacre.version"] = "4";
   WriteExr(folder / "newer.exr", parts);
   EXPECT_THAT(ReadComplaint(folder / "newer.exr"), HasSubstr("newer nacre"));
 }

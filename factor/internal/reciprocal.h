@@ -1,0 +1,23 @@
+#pragma once
+
+#include "factor/internal/bilinear.h"
+#include "factor/material.h"
+
+namespace nacre::factor::internal {
+
+/// R'_d of a reciprocal material, without row_scale. Every sum runs over what is the
+/// same from both ends in the same order, and so R'_d(x_i, d) and R'_d(x_o, −d) are
+/// equal to the last bit. What lies beyond the maps is as their nearest point.
+float ReciprocalCell(const Material& m, int channel, GridIndex point, GridIndex cell);
+
+/// The whole windows of a point in some channels, one after the other: the same values.
+void ReciprocalWindows(const Material& m,
+                       GridIndex point,
+                       int first_channel,
+                       int channels,
+                       float* windows);
+
+/// row_scale(x_i) · row_scale(x_o), which is taken as 1 for x_o beyond the grid.
+float PairScale(const Material& m, int channel, GridIndex point, GridIndex cell);
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,236 @@
+#include "factor/internal/reciprocal_data.h"
+
+#include "core/parallel.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace nacre::factor::internal {
+namespace {
+
+constexpr double kTolerance = 0.01;     // of the peak, at the peak
+constexpr double kFaintest = 1e-5;      // peaks
+constexpr double kPlanesAPair = 3 * 4;  // values, weights, linearised weights: floats
+
+double PlaneSize(const reconstruct::RdHeader& header) {
+  return (header.points_x + header.core - 1.0) * (header.points_y + header.core - 1.0);
+}
+
+std::size_t CellCount(const reconstruct::RdHeader& header) {
+  return static_cast<std::size_t>(header.WindowSize() + 1) / 2;
+}
+
+std::size_t HeldCount(const reconstruct::RdHeader& header,
+                      const ReciprocalLimits& limits) {
+  const double a_cell =
+      kPlanesAPair * PlaneSize(header) * static_cast<double>(header.channels.size());
+  const double fitting = limits.memory_bytes / a_cell;
+  return static_cast<std::size_t>(
+      std::clamp(fitting, 1.0, static_cast<double>(CellCount(header))));
+}
+
+// Of all offsets by distance, the nearer half of what fits, and the rest evenly spread
+// over the others.
+void ChooseHeld(std::size_t count, ReciprocalData& data) {
+  std::vector<int> order(data.cells);
+  std::iota(order.begin(), order.end(), 0);
+  const auto squared = [&](int cell) {
+    const int u = data.OffsetX(static_cast<std::size_t>(cell));
+    const int v = data.OffsetY(static_cast<std::size_t>(cell));
+    return u * u + v * v;
+  };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) {
+    return squared(a) < squared(b);
+  });
+  const std::size_t near = count == data.cells ? count : (count + 1) / 2;
+  data.held.assign(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(near));
+  data.share.assign(near, 1.0F);
+  const std::size_t far = count - near;
+  for (std::size_t n = 0; n < far; ++n) {
+    const double step =
+        static_cast<double>(data.cells - near) / static_cast<double>(far);
+    const auto at =
+        near + static_cast<std::size_t>((static_cast<double>(n) + 0.5) * step);
+    data.held.push_back(order[std::min(at, data.cells - 1)]);
+    data.share.push_back(static_cast<float>(step));
+  }
+}
+
+// What noise alone may come to where sigma doesn't tell, mm⁻².
+double NoiseFloor(const ChannelScan& scan) {
+  return std::max(0.0, -0.5 * scan.least);
+}
+
+struct Sums {
+  double value = 0;
+  double squared_sigma = 0;
+  double used = 0;
+};
+
+// Adds blocks of slices to the pairs of one channel and offset, both ways round.
+class PairAdder {
+ public:
+  PairAdder(const Job& job, std::size_t channel, std::size_t cell, ReciprocalData& data)
+      : header_(job.source.header()),
+        channel_(channel),
+        cell_(cell),
+        data_(data),
+        scale_(1 / data.scale[channel]),
+        floor_(NoiseFloor(job.scans[channel]) * scale_) {
+    const auto found =
+        std::find(data.held.begin(), data.held.end(), static_cast<int>(cell));
+    if (found != data.held.end()) {
+      const std::size_t at =
+          data.HeldOffset(channel, static_cast<std::size_t>(found - data.held.begin()));
+      value_ = &data.pairs.value[at];
+      weight_ = &data.pairs.weight[at];
+    }
+    if (!data.HoldsAll()) {
+      const std::size_t at = data.SampleOffset(channel, cell);
+      sample_value_ = &data.sample.value[at];
+      sample_weight_ = &data.sample.weight[at];
+    }
+  }
+
+  void Add(const SliceBlock& block, Sums& sums) {
+    const auto window = static_cast<std::size_t>(header_.WindowSize());
+    const std::size_t mirrored = window - 1 - cell_;
+    for (std::int64_t row = 0; row < block.count; ++row) {
+      const std::int64_t point = block.first + row;
+      const auto x = static_cast<int>(point % header_.points_x) + data_.margin;
+      const auto y = static_cast<int>(point / header_.points_x) + data_.margin;
+      const std::size_t slice =
+          static_cast<std::size_t>(row * header_.SliceSize()) + channel_ * window;
+      AddOne(block, slice + cell_, x, y, sums);
+      if (mirrored != cell_) {
+        AddOne(block,
+               slice + mirrored,
+               x - data_.OffsetX(cell_),
+               y - data_.OffsetY(cell_),
+               sums);
+      }
+    }
+  }
+
+ private:
+  void AddOne(const SliceBlock& block, std::size_t from, int x, int y, Sums& sums) {
+    if (block.valid[from] == 0) {
+      return;
+    }
+    const double value = static_cast<double>(block.rd[from]) * scale_;
+    double sigma =
+        block.sigma == nullptr ? 0 : static_cast<double>(block.sigma[from]) * scale_;
+    if (!(sigma > 0)) {
+      sigma = floor_;
+    }
+    sums.value += value;
+    sums.squared_sigma += sigma * sigma;
+    sums.used += 1;
+    const auto at = static_cast<std::size_t>(y * data_.width + x);
+    if (value_ != nullptr) {
+      Merge(value, sigma, value_[at], weight_[at]);
+    }
+    if (sample_value_ != nullptr && at % data_.stride == cell_ % data_.stride) {
+      const std::size_t n = at / data_.stride;
+      Merge(value, sigma, sample_value_[n], sample_weight_[n]);
+    }
+  }
+
+  // Each pair has at most two measurements; weight is −1 where there was none.
+  static void Merge(double value, double sigma, float& to, float& weight) {
+    if (weight < 0) {
+      to = static_cast<float>(value);
+      weight = static_cast<float>(sigma * sigma);
+    } else {
+      to = static_cast<float>(0.5 * (static_cast<double>(to) + value));
+      weight = static_cast<float>(0.25 * (static_cast<double>(weight) + sigma * sigma));
+    }
+  }
+
+  const reconstruct::RdHeader& header_;
+  std::size_t channel_;
+  std::size_t cell_;
+  ReciprocalData& data_;
+  double scale_;
+  double floor_;
+  float* value_ = nullptr;
+  float* weight_ = nullptr;
+  float* sample_value_ = nullptr;
+  float* sample_weight_ = nullptr;
+};
+
+}  // namespace
+
+PlaneArea AreaOf(const ReciprocalData& data, std::size_t cell) {
+  const int du = data.OffsetX(cell);
+  const int dv = data.OffsetY(cell);
+  return {std::max(0, -du),
+          data.width - std::max(0, du),
+          std::max(0, -dv),
+          data.height - std::max(0, dv)};
+}
+
+double Tolerance(double value, double q) {
+  return kTolerance * kTolerance * std::pow(std::max(value, 0.0) + kFaintest, q);
+}
+
+double ReciprocalBytes(const reconstruct::RdHeader& header,
+                       const ReciprocalLimits& limits) {
+  const auto channels = static_cast<double>(header.channels.size());
+  const auto held = static_cast<double>(HeldCount(header, limits));
+  const auto cells = static_cast<double>(CellCount(header));
+  const double sample =
+      held < cells ? cells * channels * 8 * (limits.sample_pairs + 1) : 0;
+  return kPlanesAPair * PlaneSize(header) * channels * held + sample;
+}
+
+ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
+  const reconstruct::RdHeader& header = job.source.header();
+  ReciprocalData data;
+  data.margin = header.Radius();
+  data.width = header.points_x + 2 * data.margin;
+  data.height = header.points_y + 2 * data.margin;
+  data.core = header.core;
+  data.tail_weight = limits.tail_weight;
+  data.channels = header.channels.size();
+  data.cells = CellCount(header);
+  for (const ChannelScan& scan : job.scans) {
+    data.scale.push_back(scan.peak > 0 ? scan.peak : 1);
+  }
+  ChooseHeld(HeldCount(header, limits), data);
+  const std::size_t held = data.channels * data.held.size() * data.Plane();
+  data.pairs = {std::vector<float>(held, 0.0F), std::vector<float>(held, -1.0F)};
+  data.stride = std::max<std::size_t>(
+      1, data.Plane() / static_cast<std::size_t>(limits.sample_pairs));
+  data.sample_size = data.Plane() / data.stride + 1;
+  if (!data.HoldsAll()) {
+    const std::size_t size = data.channels * data.cells * data.sample_size;
+    data.sample = {std::vector<float>(size, 0.0F), std::vector<float>(size, -1.0F)};
+  }
+  std::vector<Sums> sums(data.channels * data.cells);
+  const std::int64_t points = header.PointCount();
+  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+    Report(job.progress, {"factor", first, points, "pairs"});
+    const SliceBlock block =
+        job.source.Read(first, std::min(kBlockRows, points - first));
+    ParallelFor(std::ssize(sums), job.options.thread_count, [&](std::int64_t n) {
+      const auto at = static_cast<std::size_t>(n);
+      PairAdder(job, at / data.cells, at % data.cells, data).Add(block, sums[at]);
+    });
+  }
+  ++job.passes;
+  for (std::size_t n = 0; n < sums.size(); ++n) {
+    const std::size_t c = n / data.cells;
+    const Sums& sum = sums[n];
+    const double used = std::max(sum.used, 1.0);
+    // Offsets that no pair has are as their ring.
+    data.mean.push_back(sum.used > 0
+                            ? sum.value / used
+                            : job.scans[c].mean[n % data.cells] / data.scale[c]);
+    data.noise.push_back(std::sqrt(sum.squared_sigma / used));
+  }
+  return data;
+}
+
+}  // namespace nacre::factor::internal

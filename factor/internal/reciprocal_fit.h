@@ -1,0 +1,55 @@
+#pragma once
+
+#include "core/progress.h"
+#include "factor/internal/reciprocal_data.h"
+#include "factor/internal/reciprocal_taps.h"
+
+namespace nacre::factor::internal {
+
+/// The reciprocal model while it is being fitted: in peaks of a channel, R_d is the
+/// exponential of what kernels and maps add up to (factor/material.h).
+struct ReciprocalFit {
+  SharedMaps f;  ///< uncorrelated over the grid, mean 0, mean square 1
+  int taps = 2;
+  Eigen::MatrixXd h;  ///< a column a channel and cell, a row a kernel
+  int rounds = 0;
+
+  int Terms() const { return static_cast<int>(f.rows()); }
+};
+
+/// How kernels are fitted: from those for the logarithms of what was measured, where
+/// these are better than what there is, or on from what they are.
+enum class KernelStart { kLogarithms, kGoOn };
+
+/// Weighted least squares for the kernels of all held offsets (or of all), given the
+/// maps, an offset and channel at a time, in R_d: Gauss–Newton with the exponential
+/// linearised. Returns Σ weight · error² over the sample of those offsets.
+double SolveReciprocalKernels(const ReciprocalData& data,
+                              KernelStart start,
+                              bool all_cells,
+                              int thread_count,
+                              ReciprocalFit& fit);
+
+/// Makes of each pair's variance its weight, 1 / (variance + tolerance): the tolerance
+/// is that at what the model says. Of the held pairs, and of the sample.
+void SetHeldWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData& data);
+void SetSampleWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData& data);
+
+/// The Gauss–Newton step of all maps at once, given the kernels: conjugate gradients on
+/// the normal equations, preconditioned by each point's own block. Standard deviations
+/// of 1 are known of the maps beforehand, which holds points that little was measured
+/// of.
+SharedMaps MapStep(const ReciprocalData& data,
+                   const ReciprocalFit& fit,
+                   int thread_count);
+
+/// Alternates MapStep and SolveReciprocalKernels until it gains little. A step that
+/// doesn't lower the error is taken back by halves. Maps end turned so that each
+/// contributes as much as possible after those before it, signs canonical.
+ReciprocalFit FitReciprocal(ReciprocalData& data,
+                            const SharedMaps& start,
+                            int taps,
+                            int thread_count,
+                            const ProgressFunction& progress);
+
+}  // namespace nacre::factor::internal

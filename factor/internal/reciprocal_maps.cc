@@ -1,0 +1,245 @@
+// Maps of the reciprocal model, given its kernels.
+
+#include "core/parallel.h"
+#include "factor/internal/reciprocal_fit.h"
+#include "factor/internal/reciprocal_rows.h"
+
+#include <Eigen/Cholesky>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+namespace nacre::factor::internal {
+namespace {
+
+// Offsets are dealt to this many sums, which are added in their order: the bits don't
+// depend on the number of threads.
+constexpr std::size_t kGroups = 8;
+constexpr int kMostSteps = 10;    // of conjugate gradients
+constexpr double kEnough = 1e-3;  // of the squared residual, preconditioned
+constexpr float kMostChange = 2;  // of a logarithm
+constexpr double kPrior = 1;      // inverse variance of a map's value
+
+using RowWork = std::function<void(
+    ReciprocalRows& rows, std::size_t pairs, float share, SharedMaps& sum)>;
+
+// Calls `work` for each row of each held offset and channel, `pairs` being where the
+// row's begin, and adds up what it adds to `sum`, of `height` rows.
+SharedMaps OverRows(const ReciprocalData& data,
+                    const ReciprocalFit& fit,
+                    Eigen::Index height,
+                    int thread_count,
+                    const RowWork& work) {
+  std::vector<SharedMaps> sums(kGroups);
+  ParallelFor(kGroups, thread_count, [&](std::int64_t group) {
+    const auto g = static_cast<std::size_t>(group);
+    sums[g] = SharedMaps::Zero(height, static_cast<Eigen::Index>(data.Plane()));
+    for (std::size_t n = g; n < data.held.size(); n += kGroups) {
+      for (std::size_t c = 0; c < data.channels; ++c) {
+        ReciprocalRows rows(data, fit, c, static_cast<std::size_t>(data.held[n]));
+        for (int y = rows.area().y0; y < rows.area().y1; ++y) {
+          rows.Look(y);
+          work(rows,
+               data.HeldOffset(c, n) +
+                   static_cast<std::size_t>(y * data.width + rows.area().x0),
+               data.share[n],
+               sums[g]);
+        }
+      }
+    }
+  });
+  for (std::size_t g = 1; g < kGroups; ++g) {
+    sums[0] += sums[g];
+  }
+  return std::move(sums[0]);
+}
+
+// The weights of changes of the logarithm, and what residuals pull with.
+struct Linearized {
+  std::vector<float> weight;  ///< [pair]
+  SharedMaps pull;
+};
+
+Linearized Linearize(const ReciprocalData& data,
+                     const ReciprocalFit& fit,
+                     int thread_count) {
+  Linearized result;
+  result.weight.assign(data.pairs.value.size(), 0.0F);
+  result.pull = OverRows(
+      data,
+      fit,
+      fit.f.rows(),
+      thread_count,
+      [&](ReciprocalRows& rows, std::size_t at, float share, SharedMaps& sum) {
+        const std::size_t n = rows.Points();
+        std::vector<float> s(n);
+        rows.Model(s.data());
+        for (std::size_t i = 0; i < n; ++i) {
+          const float modelled = std::exp(std::min(s[i], static_cast<float>(kMostLog)));
+          const float weight = share * data.pairs.weight[at + i] * modelled;
+          result.weight[at + i] = weight * modelled;
+          s[i] = weight * std::clamp(data.pairs.value[at + i] - modelled,
+                                     -kMostChange * modelled,
+                                     kMostChange * modelled);
+        }
+        rows.Back(s.data(), sum);
+      });
+  return result;
+}
+
+// Inverses of each point's own block of the normal equations, and its prior.
+class Preconditioner {
+ public:
+  Preconditioner(const ReciprocalData& data,
+                 const ReciprocalFit& fit,
+                 const std::vector<float>& weight,
+                 int thread_count)
+      : terms_(fit.f.rows()),
+        thread_count_(thread_count),
+        blocks_(
+            OverRows(data,
+                     fit,
+                     terms_ * (terms_ + 1) / 2,
+                     thread_count,
+                     [&](ReciprocalRows& rows, std::size_t at, float, SharedMaps& sum) {
+                       rows.Blocks(&weight[at], sum);
+                     })) {
+    ParallelForBlocks(
+        blocks_.cols(), 4096, thread_count, [&](std::int64_t p0, std::int64_t p1) {
+          for (std::int64_t p = p0; p < p1; ++p) {
+            Store(p, Block(p).llt().solve(Eigen::MatrixXd::Identity(terms_, terms_)));
+          }
+        });
+  }
+
+  SharedMaps Apply(const SharedMaps& r) const {
+    SharedMaps result = SharedMaps::Zero(r.rows(), r.cols());
+    ParallelForBlocks(
+        r.cols(), 4096, thread_count_, [&](std::int64_t p0, std::int64_t p1) {
+          Eigen::Index row = 0;
+          for (Eigen::Index j = 0; j < terms_; ++j) {
+            for (Eigen::Index k = 0; k <= j; ++k, ++row) {
+              for (std::int64_t p = p0; p < p1; ++p) {
+                result(j, p) += blocks_(row, p) * r(k, p);
+                if (j != k) {
+                  result(k, p) += blocks_(row, p) * r(j, p);
+                }
+              }
+            }
+          }
+        });
+    return result;
+  }
+
+ private:
+  Eigen::MatrixXd Block(Eigen::Index p) const {
+    Eigen::MatrixXd block(terms_, terms_);
+    Eigen::Index row = 0;
+    for (Eigen::Index j = 0; j < terms_; ++j) {
+      for (Eigen::Index k = 0; k <= j; ++k, ++row) {
+        block(j, k) = static_cast<double>(blocks_(row, p));
+        block(k, j) = block(j, k);
+      }
+    }
+    block.diagonal().array() += kPrior + 1e-6 * block.trace();
+    return block;
+  }
+
+  void Store(Eigen::Index p, const Eigen::MatrixXd& inverse) {
+    Eigen::Index row = 0;
+    for (Eigen::Index j = 0; j < terms_; ++j) {
+      for (Eigen::Index k = 0; k <= j; ++k, ++row) {
+        blocks_(row, p) = static_cast<float>(inverse(j, k));
+      }
+    }
+  }
+
+  Eigen::Index terms_;
+  int thread_count_;
+  SharedMaps blocks_;
+};
+
+// In the order of points: the same for any number of threads.
+double Dot(const SharedMaps& a, const SharedMaps& b) {
+  double sum = 0;
+  for (Eigen::Index n = 0; n < a.size(); ++n) {
+    sum += static_cast<double>(a.data()[n]) * static_cast<double>(b.data()[n]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+SharedMaps MapStep(const ReciprocalData& data,
+                   const ReciprocalFit& fit,
+                   int thread_count) {
+  const Linearized linear = Linearize(data, fit, thread_count);
+  const Preconditioner preconditioner(data, fit, linear.weight, thread_count);
+  const auto normal = [&](const SharedMaps& change) -> SharedMaps {
+    return static_cast<float>(kPrior) * change +
+           OverRows(data,
+                    fit,
+                    fit.f.rows(),
+                    thread_count,
+                    [&](ReciprocalRows& rows, std::size_t at, float, SharedMaps& sum) {
+                      std::vector<float> s(rows.Points());
+                      rows.Along(change, s.data());
+                      for (std::size_t i = 0; i < s.size(); ++i) {
+                        s[i] *= linear.weight[at + i];
+                      }
+                      rows.Back(s.data(), sum);
+                    });
+  };
+  SharedMaps step = SharedMaps::Zero(fit.f.rows(), fit.f.cols());
+  SharedMaps r = linear.pull - static_cast<float>(kPrior) * fit.f;
+  SharedMaps z = preconditioner.Apply(r);
+  SharedMaps p = z;
+  double rz = Dot(r, z);
+  const double enough = kEnough * rz;
+  for (int n = 0; n < kMostSteps && rz > enough; ++n) {
+    const SharedMaps ap = normal(p);
+    const double curvature = Dot(p, ap);
+    if (!(curvature > 0)) {
+      break;
+    }
+    const auto length = static_cast<float>(rz / curvature);
+    step += length * p;
+    r -= length * ap;
+    z = preconditioner.Apply(r);
+    const double next = Dot(r, z);
+    p = z + static_cast<float>(next / rz) * p;
+    rz = next;
+  }
+  return step;
+}
+
+void SetHeldWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData& data) {
+  ParallelFor(std::ssize(data.held), thread_count, [&](std::int64_t held) {
+    const auto n = static_cast<std::size_t>(held);
+    std::vector<float> s;
+    for (std::size_t c = 0; c < data.channels; ++c) {
+      ReciprocalRows rows(data, fit, c, static_cast<std::size_t>(data.held[n]));
+      s.resize(rows.Points());
+      for (int y = rows.area().y0; y < rows.area().y1; ++y) {
+        rows.Look(y);
+        rows.Model(s.data());
+        float* weight =
+            &data.pairs
+                 .weight[data.HeldOffset(c, n) +
+                         static_cast<std::size_t>(y * data.width + rows.area().x0)];
+        for (std::size_t i = 0; i < s.size(); ++i) {
+          weight[i] = WeightOf(weight[i],
+                               std::exp(std::min(static_cast<double>(s[i]), kMostLog)),
+                               data.tail_weight);
+        }
+      }
+    }
+  });
+  // Pairs that no area has: nothing was measured there.
+  for (float& weight : data.pairs.weight) {
+    weight = std::max(weight, 0.0F);
+  }
+}
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,86 @@
+// Reciprocal model in the logarithm, its maps shared by all channels.
+
+#include "core/error.h"
+#include "factor/internal/method.h"
+#include "factor/internal/reciprocal_fit.h"
+#include "factor/internal/reciprocal_taps.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+namespace nacre::factor::internal {
+namespace {
+
+class ReciprocalMethod final : public Method {
+ public:
+  explicit ReciprocalMethod(Job& job)
+      : job_(job),
+        data_(ReadReciprocal(job, LimitsOf(job.options))),
+        start_(StartingMaps(job, data_, job.options.terms)) {}
+
+  int MostTerms() const override { return static_cast<int>(start_.rows()); }
+
+  Material Make(int terms) override {
+    const ReciprocalFit fit = FitReciprocal(data_,
+                                            start_.topRows(terms),
+                                            job_.options.taps,
+                                            job_.options.thread_count,
+                                            job_.progress);
+    Material m = EmptyMaterial(job_.source.header());
+    m.form = Form::kReciprocal;
+    m.terms = terms;
+    m.taps = job_.options.taps;
+    m.margin = data_.margin;
+    m.a = data_.scale;
+    m.f.assign(fit.f.data(), fit.f.data() + fit.f.size());
+    const auto size = static_cast<std::size_t>(m.KernelSize());
+    for (std::size_t c = 0; c < data_.channels; ++c) {
+      for (int k = 0; k < m.KernelCount(); ++k) {
+        for (std::size_t cell = 0; cell < size; ++cell) {
+          const auto window = static_cast<std::size_t>(m.WindowSize());
+          const std::size_t n = std::min(cell, window - 1 - cell);
+          m.h.push_back(static_cast<float>(
+              fit.h(k, static_cast<Eigen::Index>(c * data_.cells + n))));
+        }
+      }
+    }
+    return m;
+  }
+
+  void Describe(FactorSummary& summary) const override {
+    summary.a = data_.scale;
+    if (!data_.HoldsAll()) {
+      summary.notes.push_back(fmt::format(
+          "maps are fitted to {} of {} offsets, as memory allows (option memory_mb)",
+          data_.held.size(),
+          data_.cells));
+    }
+  }
+
+ private:
+  Job& job_;
+  ReciprocalData data_;
+  SharedMaps start_;
+};
+
+}  // namespace
+
+ReciprocalLimits LimitsOf(const FactorOptions& options) {
+  const int kernels = ReciprocalKernelCount(options.terms, options.taps);
+  return {.terms = options.terms,
+          .sample_pairs = std::clamp(24 * kernels, 3000, 20000),
+          .memory_bytes = options.memory_mb * 1e6,
+          .tail_weight = options.tail_weight};
+}
+
+std::unique_ptr<Method> MakeReciprocalMethod(Job& job) {
+  if (job.options.clusters > 1) {
+    throw UsageError(
+        "option clusters: the reciprocal model has no clusters: its kernels join "
+        "points "
+        "that might lie in two");
+  }
+  return std::make_unique<ReciprocalMethod>(job);
+}
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,106 @@
+// What the maps of a reciprocal model begin with.
+
+#include "core/parallel.h"
+#include "factor/internal/reciprocal_data.h"
+#include "factor/internal/truncated_svd.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace nacre::factor::internal {
+namespace {
+
+constexpr double kLeastShare = 0.02;  // of the mean: logarithms stop there
+
+// Logarithms of slices over the mean slice's, with weights that make their error that
+// of R_d over its tolerance. What wasn't measured is as the mean.
+class LogRows {
+ public:
+  LogRows(const ReciprocalData& data, const reconstruct::RdHeader& header)
+      : window_(static_cast<std::size_t>(header.WindowSize())) {
+    for (std::size_t c = 0; c < data.channels; ++c) {
+      for (std::size_t cell = 0; cell < window_; ++cell) {
+        const std::size_t n = c * data.cells + std::min(cell, window_ - 1 - cell);
+        const double mean = std::max(data.mean[n], 1e-12);
+        const double noise = data.noise[n];
+        cells_.push_back(
+            {data.scale[c] * mean,
+             std::max(2 * noise / mean, kLeastShare),
+             mean / std::sqrt(noise * noise + Tolerance(mean, data.tail_weight))});
+      }
+    }
+  }
+
+  void Make(const float* rd, const std::uint8_t* valid, double* row) const {
+    for (std::size_t n = 0; n < cells_.size(); ++n) {
+      const Cell& cell = cells_[n];
+      row[n] =
+          valid[n] == 0
+              ? 0
+              : cell.weight * std::log(std::max(static_cast<double>(rd[n]) / cell.mean,
+                                                cell.least));
+    }
+  }
+
+ private:
+  struct Cell {
+    double mean;   // mm⁻²
+    double least;  // means
+    double weight;
+  };
+  std::size_t window_;
+  std::vector<Cell> cells_;
+};
+
+// Beyond the grid, what its nearest point has.
+void ExtendMaps(const ReciprocalData& data, SharedMaps& maps) {
+  const int margin = data.margin;
+  for (int y = 0; y < data.height; ++y) {
+    for (int x = 0; x < data.width; ++x) {
+      const int from_x = std::clamp(x, margin, data.width - 1 - margin);
+      const int from_y = std::clamp(y, margin, data.height - 1 - margin);
+      maps.col(y * data.width + x) = maps.col(from_y * data.width + from_x);
+    }
+  }
+}
+
+}  // namespace
+
+SharedMaps StartingMaps(Job& job, const ReciprocalData& data, int terms) {
+  const reconstruct::RdHeader& header = job.source.header();
+  const LogRows rows(data, header);
+  const reconstruct::RdDataset& sample = job.sample.dataset;
+  RowMatrix y(std::ssize(job.sample.rows), header.SliceSize());
+  for (Eigen::Index row = 0; row < y.rows(); ++row) {
+    const auto at = static_cast<std::size_t>(row * header.SliceSize());
+    rows.Make(&sample.rd[at], &sample.valid[at], &y(row, 0));
+  }
+  const Eigen::RowVectorXd mean = y.colwise().mean();
+  y.rowwise() -= mean;
+  const Eigen::MatrixXd basis = y.cwiseAbs().maxCoeff() > 1e-9
+                                    ? ComputeTruncatedSvd(y, terms).basis
+                                    : Eigen::MatrixXd(y.cols(), 0);
+  SharedMaps maps = SharedMaps::Zero(std::max<Eigen::Index>(basis.cols(), 1),
+                                     static_cast<Eigen::Index>(data.Plane()));
+  const std::int64_t points = header.PointCount();
+  for (std::int64_t first = 0; basis.cols() > 0 && first < points;
+       first += kBlockRows) {
+    Report(job.progress, {"factor", first, points, "starting maps"});
+    const SliceBlock block =
+        job.source.Read(first, std::min(kBlockRows, points - first));
+    ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
+      Eigen::VectorXd slice(header.SliceSize());
+      const std::int64_t at = row * header.SliceSize();
+      rows.Make(block.rd + at, block.valid + at, slice.data());
+      const std::int64_t point = first + row;
+      const std::int64_t to = (point / header.points_x + data.margin) * data.width +
+                              point % header.points_x + data.margin;
+      maps.col(to) = (basis.transpose() * (slice - mean.transpose())).cast<float>();
+    });
+  }
+  ++job.passes;
+  ExtendMaps(data, maps);
+  return maps;
+}
+
+}  // namespace nacre::factor::internal

@@ -1,0 +1,142 @@
+#include "factor/internal/reciprocal_totals.h"
+
+#include "core/parallel.h"
+#include "factor/internal/reciprocal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+namespace nacre::factor::internal {
+namespace {
+
+constexpr int kMostRounds = 12;
+constexpr int kReach = 2;        // points around one that is out of bounds
+constexpr double kFarthest = 2;  // factors stay below it, and above its inverse
+
+// What the total of a slice's whole modelled window may be.
+struct Interval {
+  double low = 0;
+  double high = 1e300;
+};
+
+std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const std::int64_t points = m.PointCount();
+  const auto channels = static_cast<int>(m.channels.size());
+  std::vector<Interval> wanted(m.row_scale.size());
+  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+    Report(job.progress, {"factor", first, points, "totals"});
+    const SliceBlock block =
+        job.source.Read(first, std::min(kBlockRows, points - first));
+    ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
+      const std::int64_t point = first + row;
+      std::vector<float> values(window * m.channels.size());
+      ReciprocalWindows(
+          m,
+          {static_cast<int>(point % m.points_x), static_cast<int>(point / m.points_x)},
+          0,
+          channels,
+          values.data());
+      const std::size_t slice = static_cast<std::size_t>(row) * values.size();
+      for (std::size_t c = 0; c < m.channels.size(); ++c) {
+        double measured = 0;
+        double modelled = 0;
+        double whole = 0;
+        for (std::size_t n = c * window; n < (c + 1) * window; ++n) {
+          const auto value = static_cast<double>(values[n]);
+          whole += value;
+          if (block.valid[slice + n] != 0) {
+            measured += static_cast<double>(block.rd[slice + n]);
+            modelled += value;
+          }
+        }
+        if (measured > 0 && modelled > 0) {
+          const double total = measured * whole / modelled;
+          wanted[c * static_cast<std::size_t>(points) +
+                 static_cast<std::size_t>(point)] = {total * (1 - bound),
+                                                     total * (1 + bound)};
+        }
+      }
+    });
+  }
+  ++job.passes;
+  return wanted;
+}
+
+double TotalOf(const Material& m, int channel, std::int64_t point) {
+  std::vector<float> values(static_cast<std::size_t>(m.WindowSize()));
+  m.EvaluateWindow(channel,
+                   static_cast<int>(point % m.points_x),
+                   static_cast<int>(point / m.points_x),
+                   values.data());
+  return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+// Points to look at again: those that a change nearby may move.
+void Spread(const Material& m, std::int64_t point, std::vector<std::uint8_t>& marked) {
+  const auto x = static_cast<int>(point % m.points_x);
+  const auto y = static_cast<int>(point / m.points_x);
+  for (int j = std::max(0, y - kReach); j <= std::min(m.points_y - 1, y + kReach);
+       ++j) {
+    for (int i = std::max(0, x - kReach); i <= std::min(m.points_x - 1, x + kReach);
+         ++i) {
+      marked[static_cast<std::size_t>(std::int64_t{j} * m.points_x + i)] = 1;
+    }
+  }
+}
+
+void BalanceChannel(
+    const Job& job, int channel, const Interval* wanted, float step, Material& m) {
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  float* scale = &m.row_scale[static_cast<std::size_t>(channel) * points];
+  std::vector<std::uint8_t> marked(points, 1);
+  for (int round = 0; round < kMostRounds; ++round) {
+    std::vector<float> next(scale, scale + points);
+    ParallelFor(m.PointCount(), job.options.thread_count, [&](std::int64_t p) {
+      const auto n = static_cast<std::size_t>(p);
+      if (marked[n] == 0) {
+        return;
+      }
+      const double total = TotalOf(m, channel, p);
+      const double goal = std::clamp(total, wanted[n].low, wanted[n].high);
+      if (goal != total) {
+        const double factor = static_cast<double>(scale[n]) * std::sqrt(goal / total);
+        next[n] = static_cast<float>(std::clamp(factor, 1 / kFarthest, kFarthest));
+      }
+    });
+    std::fill(marked.begin(), marked.end(), std::uint8_t{0});
+    bool moved = false;
+    for (std::size_t p = 0; p < points; ++p) {
+      if (std::abs(next[p] - scale[p]) > 0.1F * step) {
+        Spread(m, static_cast<std::int64_t>(p), marked);
+        moved = true;
+      }
+      scale[p] = next[p];
+    }
+    if (!moved) {
+      break;
+    }
+  }
+  for (std::size_t p = 0; p < points; ++p) {
+    scale[p] = std::nearbyint(scale[p] / step) * step;
+  }
+}
+
+}  // namespace
+
+void BalanceTotals(Job& job, double bound, Material& m) {
+  const auto step =
+      static_cast<float>(std::exp2(std::floor(std::log2(std::max(bound, 1e-6) / 4))));
+  if (!m.steps.empty()) {
+    m.steps.row_scale = step;
+  }
+  const std::vector<Interval> wanted =
+      Wanted(job, std::max(bound - static_cast<double>(step), 0.0), m);
+  for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
+    BalanceChannel(
+        job, c, &wanted[static_cast<std::size_t>(c * m.PointCount())], step, m);
+  }
+}
+
+}  // namespace nacre::factor::internal
