@@ -1,8 +1,12 @@
-// nacre export: a dataset to other programs' formats.
+// nacre export: a dataset or a material to other programs' formats.
 
+#include "cli/artefact.h"
 #include "cli/command_line.h"
 #include "core/error.h"
 #include "reconstruct/export/psf.h"
+#ifdef NACRE_HAS_FACTOR
+#include "cli/exchange/export_maps.h"
+#endif
 
 #include <filesystem>
 #include <memory>
@@ -17,10 +21,7 @@ struct Arguments {
   reconstruct::ExportOptions options;
 };
 
-int Run(const Arguments& args, const Common& common) {
-  if (args.to != "psf") {
-    throw UsageError("--to " + args.to + ": not in this version, which writes psf");
-  }
+int ToPsf(const Arguments& args, const Common& common) {
   const reconstruct::ExportSummary summary = reconstruct::ExportPsf(
       args.file, args.out, args.options, ConsoleProgress(common));
   Say(common, "exported " + args.file.string() + ": " + summary.Brief());
@@ -33,13 +34,67 @@ int Run(const Arguments& args, const Common& common) {
   return 0;
 }
 
+#ifdef NACRE_HAS_FACTOR
+
+exchange::ProfileFit Fit(const std::filesystem::path& file, const Common& common) {
+  const ProgressFunction progress = ConsoleProgress(common);
+  if (DetectKind(file) == ArtefactKind::kMaterial) {
+    return exchange::FitProfiles(
+        factor::ReadMaterial(file), common.thread_count, progress);
+  }
+  reconstruct::RdReader reader(file);
+  return exchange::FitProfiles(reader, common.thread_count, progress);
+}
+
+int ToRenderer(const exchange::Target& target,
+               const Arguments& args,
+               const Common& common) {
+  // A preset's folder stands for its material.
+  const bool preset = std::filesystem::is_directory(args.file);
+  const std::filesystem::path file =
+      preset ? args.file / "material.nacre.exr" : args.file;
+  const exchange::ProfileFit fit = Fit(file, common);
+  const std::string source =
+      (preset ? args.file : file).lexically_normal().filename().string();
+  Json json = exchange::ExportMaps(target, fit, source, args.out);
+  json["out"] = args.out.string();
+  Say(common, "fit: " + fit.summary.Brief());
+  Say(common, std::string("lost: ") + target.lost);
+  Print(common, json, args.out.string() + ": for " + target.program);
+  return 0;
+}
+
+#endif
+
+int Run(const Arguments& args, const Common& common) {
+  if (args.to == "psf") {
+    return ToPsf(args, common);
+  }
+  std::string known = "psf";
+#ifdef NACRE_HAS_FACTOR
+  if (const exchange::Target* target = exchange::FindTarget(args.to)) {
+    return ToRenderer(*target, args, common);
+  }
+  for (const exchange::Target& target : exchange::Targets()) {
+    known += std::string(", ") + target.name;
+  }
+#endif
+  throw UsageError("--to " + args.to + ": this build writes " + known);
+}
+
 }  // namespace
 
 std::function<int()> MakeExportVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
-  app.add_option("file", args->file, "dataset, *.rd.exr")->required();
-  app.add_option("--to", args->to, "psf")->required();
-  app.add_option("-o,--out", args->out, "file to write")->required();
+  app.add_option("file", args->file, "dataset, *.rd.exr; to renderers also *.nacre.exr")
+      ->required();
+  app.add_option("--to",
+                 args->to,
+                 "psf, or a renderer: cycles, pbrt-v4, mtlx, renderman, appleseed, "
+                 "mitsuba3")
+      ->required();
+  app.add_option("-o,--out", args->out, "file to write; of renderers a folder")
+      ->required();
   AddOptions(app, args->options);
   return [args, &common] { return Run(*args, common); };
 }
