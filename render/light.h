@@ -1,9 +1,11 @@
 #pragma once
 
+#include "render/environment.h"
+#include "render/texture.h"
 #include "render/transform.h"
 #include "render/vec.h"
 
-#include <cstdint>
+#include <memory>
 #include <variant>
 
 namespace nacre::render {
@@ -36,8 +38,30 @@ struct ConstantLight {
   Color radiance;
 };
 
+/// A picture of the light from everywhere.
+struct EnvironmentLight {
+  std::shared_ptr<const Environment> environment;
+};
+
+/// A slide projector: a pinhole that throws a picture. In its own frame it looks along
+/// +z with +y up and +x to the left, as a camera does: from its place, the picture is
+/// seen upright.
+struct ProjectorLight {
+  Transform world_from_projector;
+  TexturePtr irradiance;  ///< on a plane across its axis at distance 1
+  float scale = 1;
+  float half_width = 0.5F;  ///< of the picture, at distance 1
+  float half_height = 0.5F;
+};
+
 struct Light {
-  std::variant<PointLight, SpotLight, DirectionalLight, ConstantLight> source;
+  std::variant<PointLight,
+               SpotLight,
+               DirectionalLight,
+               ConstantLight,
+               EnvironmentLight,
+               ProjectorLight>
+      source;
   float sampling_weight = 1;
 };
 

@@ -75,6 +75,9 @@ class BitmapTexture : public Texture {
 
   Color Mean() const override { return mean_; }
   Color Max() const override { return max_; }
+  float Aspect() const override {
+    return static_cast<float>(bitmap_.width) / static_cast<float>(bitmap_.height);
+  }
 
  private:
   // The index in [0, size) of coordinate i; −1: nothing there, −2: white there.

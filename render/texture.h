@@ -16,6 +16,8 @@ class Texture {
   /// Of all values, a channel; to choose between lobes and to check ranges.
   virtual Color Mean() const = 0;
   virtual Color Max() const = 0;
+  /// Width / height of the picture, if it is one.
+  virtual float Aspect() const { return 1; }
 };
 using TexturePtr = std::shared_ptr<const Texture>;
 

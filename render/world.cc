@@ -44,7 +44,34 @@ Color PowerOf(const Light& light, float scene_radius) {
   if (const auto* directional = std::get_if<DirectionalLight>(&light.source)) {
     return directional->irradiance * disk;
   }
+  if (const auto* projector = std::get_if<ProjectorLight>(&light.source)) {
+    return projector->irradiance->Mean() *
+           (projector->scale * 4 * projector->half_width * projector->half_height);
+  }
+  if (const auto* far = std::get_if<EnvironmentLight>(&light.source)) {
+    return far->environment->Mean() * (kPi * disk);
+  }
   return std::get<ConstantLight>(light.source).radiance * (kPi * disk);
+}
+
+// A plane at distance 1 sees E = I cos³ θ.
+LightSample FromProjector(const ProjectorLight& projector, Vec3 position) {
+  const Vec3 pinhole = projector.world_from_projector.Point({0, 0, 0});
+  LightSample sample = FromPoint(pinhole, {1, 1, 1}, position);
+  const Transform& t = projector.world_from_projector;
+  const Frame frame(Normalized(t.Vector({1, 0, 0})),
+                    Normalized(t.Vector({0, 1, 0})),
+                    Normalized(t.Vector({0, 0, 1})));
+  const Vec3 local = frame.ToLocal(-sample.wi);
+  const float x = local.x / (local.z * projector.half_width);
+  const float y = local.y / (local.z * projector.half_height);
+  if (!(sample.pdf > 0) || !(local.z > 0) || std::abs(x) > 1 || std::abs(y) > 1) {
+    return {};
+  }
+  const Color irradiance =
+      projector.irradiance->At({0.5F * (1 - x), 0.5F * (1 + y)}) * projector.scale;
+  sample.radiance = sample.radiance * irradiance / (local.z * local.z * local.z);
+  return sample;
 }
 
 // Seen from outside, a sphere is a cone; [Shirley96].
@@ -91,9 +118,9 @@ World::World(const Scene& scene, int thread_count)
       source_of_shape_(scene.shapes.size(), -1) {
   const float radius = std::max(geometry_.radius(), 1e-6F);
   for (const Light& light : scene.lights) {
-    if (const auto* constant = std::get_if<ConstantLight>(&light.source)) {
-      background_ += constant->radiance;
-      background_source_ = static_cast<int>(sources_.size());
+    if (std::holds_alternative<ConstantLight>(light.source) ||
+        std::holds_alternative<EnvironmentLight>(light.source)) {
+      backgrounds_.push_back(sources_.size());
     }
     Source source;
     source.light = &light;
@@ -132,7 +159,8 @@ void World::AddSource(Source source, Color power, float weight) {
 bool World::IsDeltaLight(std::size_t light) const {
   const Source& source = sources_[light];
   return source.light != nullptr &&
-         !std::holds_alternative<ConstantLight>(source.light->source);
+         !std::holds_alternative<ConstantLight>(source.light->source) &&
+         !std::holds_alternative<EnvironmentLight>(source.light->source);
 }
 
 LightSample World::SampleLight(Vec3 position, Vec3 side, float u_light, Vec2 u) const {
@@ -172,6 +200,17 @@ LightSample World::SampleLight(std::size_t light,
   }
   if (const auto* directional = std::get_if<DirectionalLight>(&any)) {
     return {-directional->direction, kInfinity, directional->irradiance, 1, true};
+  }
+  if (const auto* projector = std::get_if<ProjectorLight>(&any)) {
+    return FromProjector(*projector, position);
+  }
+  if (const auto* far = std::get_if<EnvironmentLight>(&any)) {
+    const Environment::Sample sample = far->environment->SampleDirection(u);
+    return {sample.direction,
+            kInfinity,
+            far->environment->Radiance(sample.direction) / sample.pdf,
+            sample.pdf,
+            false};
   }
   // A constant light is best sampled by the cosine at the surface.
   const Vec3 local = SquareToCosineHemisphere(u);
@@ -235,12 +274,27 @@ float World::EmissionPdf(const SurfaceHit& hit, Vec3 position) const {
          (cosine * static_cast<float>(source.emitter->area()));
 }
 
-float World::BackgroundPdf(Vec3 side, Vec3 wi) const {
-  if (background_source_ < 0) {
-    return 0;
+Color World::Background(Vec3 direction) const {
+  Color sum;
+  for (const std::size_t i : backgrounds_) {
+    const auto& any = sources_[i].light->source;
+    const auto* constant = std::get_if<ConstantLight>(&any);
+    sum += constant != nullptr
+               ? constant->radiance
+               : std::get<EnvironmentLight>(any).environment->Radiance(direction);
   }
-  return sources_[static_cast<std::size_t>(background_source_)].probability *
-         CosineHemispherePdf(Dot(side, wi));
+  return sum;
+}
+
+float World::BackgroundPdf(Vec3 side, Vec3 wi) const {
+  float sum = 0;
+  for (const std::size_t i : backgrounds_) {
+    const auto* far = std::get_if<EnvironmentLight>(&sources_[i].light->source);
+    sum +=
+        sources_[i].probability * (far != nullptr ? far->environment->Pdf(wi)
+                                                  : CosineHemispherePdf(Dot(side, wi)));
+  }
+  return sum;
 }
 
 }  // namespace nacre::render

@@ -48,7 +48,7 @@ class World {
   /// this hit of an emitting shape, seen from `position`.
   float EmissionPdf(const SurfaceHit& hit, Vec3 position) const;
   /// Radiance from where nothing is, and its density.
-  Color Background() const { return background_; }
+  Color Background(Vec3 direction) const;
   float BackgroundPdf(Vec3 side, Vec3 wi) const;
 
  private:
@@ -66,9 +66,8 @@ class World {
   const Scene& scene_;
   EmbreeScene geometry_;
   std::vector<Source> sources_;
-  std::vector<int> source_of_shape_;  ///< −1: doesn't emit
-  int background_source_ = -1;
-  Color background_;
+  std::vector<int> source_of_shape_;      ///< −1: doesn't emit
+  std::vector<std::size_t> backgrounds_;  ///< sources that are everywhere
 };
 
 }  // namespace nacre::render

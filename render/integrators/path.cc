@@ -95,7 +95,8 @@ void PathTracer::Trace(State& state) const {
         const float other =
             state.delta ? 0 : world_.BackgroundPdf(state.side, state.ray.direction);
         const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
-        state.radiance += state.throughput * world_.Background() * weight;
+        state.radiance +=
+            state.throughput * world_.Background(state.ray.direction) * weight;
       }
       return;
     }

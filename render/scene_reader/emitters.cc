@@ -1,5 +1,7 @@
 #include "render/scene_reader/objects.h"
 
+#include <cmath>
+#include <memory>
 #include <numbers>
 
 namespace nacre::render {
@@ -45,6 +47,37 @@ SpotLight ReadSpot(Element& element) {
           static_cast<float>(beam_deg * kDegree)};
 }
 
+EnvironmentLight ReadEnvironment(Element& element) {
+  const Transform to_world = element.ToWorld();
+  const Vec3 x = Normalized(to_world.Vector({1, 0, 0}));
+  const Vec3 y = Normalized(to_world.Vector({0, 1, 0}));
+  const Vec3 z = Normalized(to_world.Vector({0, 0, 1}));
+  const float shear = std::abs(Dot(x, y)) + std::abs(Dot(y, z)) + std::abs(Dot(z, x));
+  if (!(shear < 1e-4F)) {
+    element.FailAt("toWorld", "an environment can only be turned and mirrored");
+  }
+  const auto scale = static_cast<float>(
+      InRange(element, "scale", element.Float("scale", 1), {0, 1e9}));
+  return {std::make_shared<Environment>(ReadPicture(element), Frame(x, y, z), scale)};
+}
+
+ProjectorLight ReadProjector(Element& element) {
+  constexpr double kDegree = std::numbers::pi / 180;
+  const double fov_deg =
+      InRange(element, "fov", element.Float("fov", 45), {0.001, 179});
+  ProjectorLight projector;
+  projector.world_from_projector = element.ToWorld();
+  if (projector.world_from_projector.Determinant() == 0) {
+    element.FailAt("toWorld", "the transform flattens the projector");
+  }
+  projector.irradiance = element.TextureOr("irradiance", kWhite);
+  projector.scale = static_cast<float>(
+      InRange(element, "scale", element.Float("scale", 1), {0, 1e9}));
+  projector.half_width = static_cast<float>(std::tan(0.5 * fov_deg * kDegree));
+  projector.half_height = projector.half_width / projector.irradiance->Aspect();
+  return projector;
+}
+
 }  // namespace
 
 void ReadEmitter(Element element) {
@@ -61,10 +94,16 @@ void ReadEmitter(Element element) {
     light.source = DirectionalLight{direction, element.Spectrum("irradiance", kWhite)};
   } else if (type == "constant") {
     light.source = ConstantLight{element.Spectrum("radiance", kWhite)};
+  } else if (type == "envmap") {
+    light.source = ReadEnvironment(element);
+  } else if (type == "projector") {
+    light.source = ReadProjector(element);
   } else if (type == "area") {
     element.Fail("an area light belongs inside the shape that shines");
   } else {
-    UnknownPlugin(element, {"point", "spot", "directional", "constant", "area"});
+    UnknownPlugin(
+        element,
+        {"point", "spot", "directional", "constant", "envmap", "projector", "area"});
     return;
   }
   element.Finish();

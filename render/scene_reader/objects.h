@@ -11,6 +11,8 @@ namespace nacre::render {
 
 /// One function a kind of object; each adds to, or is used by, the document's scene.
 TexturePtr ReadTexture(Element element);
+/// The pixels of the element's `filename`, made linear by its `gamma`.
+Bitmap ReadPicture(Element& element);
 BsdfPtr ReadBsdf(Element element);
 void ReadEmitter(Element element);
 void ReadShape(Element element);

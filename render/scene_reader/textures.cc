@@ -93,10 +93,6 @@ WrapMode ReadWrapMode(Element& element, const char* name, const std::string& mod
 }
 
 TexturePtr ReadBitmap(Element& element) {
-  const std::string name = element.String("filename", "");
-  if (name.empty()) {
-    element.Fail("a bitmap needs a <string name=\"filename\">");
-  }
   BitmapOptions options;
   options.map = ReadUvMap(element);
   const std::string both = element.String("wrapMode", "repeat");
@@ -108,6 +104,17 @@ TexturePtr ReadBitmap(Element& element) {
   element.Ignore("maxAnisotropy", "pictures are interpolated bilinearly");
   element.Ignore("cache", "pictures are held in memory");
 
+  return MakeBitmap(ReadPicture(element), options);
+}
+
+}  // namespace
+
+Bitmap ReadPicture(Element& element) {
+  const std::string name = element.String("filename", "");
+  if (name.empty()) {
+    element.Fail(
+        fmt::format("{} needs a <string name=\"filename\">", element.type()));
+  }
   const std::filesystem::path path = element.document().File(element.node(), name);
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(), [](char c) {
@@ -124,10 +131,8 @@ TexturePtr ReadBitmap(Element& element) {
   }
   Bitmap bitmap = png ? FromPng(path, gamma) : FromExr(path, gamma);
   CheckPixels(element, bitmap);
-  return MakeBitmap(std::move(bitmap), options);
+  return bitmap;
 }
-
-}  // namespace
 
 TexturePtr ReadTexture(Element element) {
   const std::string type = element.type();

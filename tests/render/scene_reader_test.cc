@@ -187,7 +187,7 @@ TEST(SceneReaderTest, UnknownWordsAreErrorsWithTheLineAndTheNearestWord) {
       {"<shape type=\"cube\"><bsdf type=\"diffuse\"><texture name=\"reflectance\" "
        "type=\"bitmp\"/></bsdf></shape>",
        "no texture 'bitmp'; did you mean 'bitmap'?"},
-      {"<emitter type=\"envmap\"/>", "no emitter 'envmap'; known are point, spot"},
+      {"<emitter type=\"sunsky\"/>", "no emitter 'sunsky'; known are point, spot"},
       {"<shape type=\"cube\"><subsurface type=\"dipol\"/></shape>",
        "no subsurface 'dipol'; did you mean 'dipole'?"},
       {"<shape type=\"cube\"><floatt name=\"x\" value=\"1\"/></shape>",
@@ -373,7 +373,7 @@ TEST(SceneReaderTest, BadTexturesAreRefused) {
   const auto file = [](const std::string& name) {
     return "<string name=\"filename\" value=\"" + name + "\"/>";
   };
-  EXPECT_THAT(error(""), HasSubstr("a bitmap needs"));
+  EXPECT_THAT(error(""), HasSubstr("bitmap needs"));
   EXPECT_THAT(error(file("t.jpg")), HasSubstr("neither .png nor .exr: convert it"));
   EXPECT_THAT(error(file("t.png")), HasSubstr("t.png"));
   EXPECT_THAT(error(file("t.exr")),
