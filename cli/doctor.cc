@@ -4,7 +4,11 @@
 #include "cli/camera_check.h"
 #endif
 #include "cli/command_line.h"
+#ifdef NACRE_HAS_HELIOS
+#include "cli/laser_check.h"
+#endif
 #include "cli/machine_check.h"
+#include "cli/network_check.h"
 #include "cli/resources.h"
 #include "cli/verbs.h"
 #include "core/error.h"
@@ -93,11 +97,15 @@ std::vector<Finding> CheckDrivers() {
                       State::kNote,
                       "build with NACRE_WITH_ARAVIS (needs Aravis)"});
 #endif
+#ifdef NACRE_HAS_HELIOS
+  findings.push_back({"drivers", "lasers", "Helios DAC", State::kGood, ""});
+#else
   findings.push_back({"drivers",
-                      "illuminators",
-                      "none",
+                      "lasers",
+                      "left out",
                       State::kNote,
-                      "only a simulated rig can be captured with"});
+                      "build with NACRE_WITH_HELIOS (needs libusb)"});
+#endif
   return findings;
 }
 
@@ -137,11 +145,26 @@ int Run(const std::string& camera, const Common& common) {
         "NACRE_WITH_ARAVIS");
   }
 #endif
+#ifdef NACRE_HAS_HELIOS
+  add(CheckLasers());
+#endif
   add(CheckMachine("/", std::filesystem::current_path()));
+  add(CheckDiskSpeed(std::filesystem::current_path()));
+  add(CheckLoopback());
   std::stable_sort(
       findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
         const auto rank = [](const Finding& f) {
-          return f.area == "build" ? 0 : f.area == "library" ? 1 : 2;
+          constexpr const char* kOrder[] = {
+              "build", "library", "drivers", "camera", "laser"};
+          const auto at = std::find(std::begin(kOrder), std::end(kOrder), f.area);
+          if (at != std::end(kOrder)) {
+            return at - std::begin(kOrder);
+          }
+          return std::ssize(kOrder) + (f.area == "disk"      ? 2
+                                       : f.area == "network" ? 3
+                                       : f.area == "usb"     ? 4
+                                       : f.area == "memory"  ? 1
+                                                             : 0);
         };
         return rank(a) < rank(b);
       });

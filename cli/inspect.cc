@@ -197,9 +197,13 @@ Json InspectSession(const std::filesystem::path& path, const Common& common) {
   const acquire::SessionReader session(path);
   const acquire::RigDescription& rig = session.rig();
   const ProgressFunction progress = ConsoleProgress(common);
+  std::int64_t taken = 0;
   for (std::int64_t n = 0; n < session.picture_count(); ++n) {
     Report(progress, {"inspect", n, session.picture_count(), "checksums"});
-    session.ReadFrame(n);  // throws if the picture isn't the one of the journal
+    if (session.WasTaken(n)) {
+      session.ReadFrame(n);  // throws if the picture isn't the one of the journal
+      ++taken;
+    }
   }
   const bool complete = session.IsComplete();
   const acquire::CameraInfo& camera = session.manifest().camera;
@@ -216,11 +220,12 @@ Json InspectSession(const std::filesystem::path& path, const Common& common) {
           {"core", rig.grid.core},
           {"pitch_mm", rig.grid.pitch_mm},
           {"pictures", session.picture_count()},
+          {"pictures_left_out", session.picture_count() - taken},
           {"pictures_planned", session.schedule().size()},
           {"complete", complete},
           {"resumable", !complete},
           {"scan_map", session.manifest().scan_map.has_value()},
-          {"checksums", fmt::format("{} pictures verified", session.picture_count())},
+          {"checksums", fmt::format("{} pictures verified", taken)},
           {"provenance", {{"version", session.manifest().software_version}}}};
 #else
   (void)common;

@@ -187,6 +187,13 @@ constexpr KnownDevice kKnownDevices[] = {
     {"9588:9899", "BJJCZ galvo board"},
 };
 
+fs::path UsbNode(const fs::path& root, const fs::path& device) {
+  return root / "dev/bus/usb" /
+         fmt::format("{:03.0f}/{:03.0f}",
+                     NumberIn(device / "busnum").value_or(0),
+                     NumberIn(device / "devnum").value_or(0));
+}
+
 void CheckUsbDevice(const fs::path& root,
                     const fs::path& device,
                     std::vector<Finding>& findings) {
@@ -202,10 +209,7 @@ void CheckUsbDevice(const fs::path& root,
   if (known == std::end(kKnownDevices)) {
     return;
   }
-  const fs::path node = root / "dev/bus/usb" /
-                        fmt::format("{:03.0f}/{:03.0f}",
-                                    NumberIn(device / "busnum").value_or(0),
-                                    NumberIn(device / "devnum").value_or(0));
+  const fs::path node = UsbNode(root, device);
   const bool usable = ::access(node.c_str(), R_OK | W_OK) == 0;
   findings.push_back(
       {"usb",
@@ -221,19 +225,59 @@ void CheckUsbDevice(const fs::path& root,
                             *product)});
 }
 
+// USB3 Vision has no vendor of its own: an interface of class EF, subclass 05 tells it.
+void CheckUsbCamera(const fs::path& root,
+                    const fs::path& interface,
+                    std::vector<Finding>& findings) {
+  if (FirstLine(interface / "bInterfaceClass") != "ef" ||
+      FirstLine(interface / "bInterfaceSubClass") != "05" ||
+      FirstLine(interface / "bInterfaceProtocol") != "00") {  // its control interface
+    return;
+  }
+  const std::string name = interface.filename().string();
+  const fs::path device = interface.parent_path() / name.substr(0, name.find(':'));
+  const fs::path node = UsbNode(root, device);
+  const auto speed = NumberIn(device / "speed");
+  const bool usable = ::access(node.c_str(), R_OK | W_OK) == 0;
+  const bool fast = !speed || *speed >= 5000;
+  findings.push_back({"usb",
+                      FirstLine(device / "product").value_or("USB3 Vision camera"),
+                      fmt::format("USB3 Vision at {}{}",
+                                  node.string(),
+                                  speed ? fmt::format(", {:.0f} Mbit/s", *speed) : ""),
+                      !usable ? State::kProblem
+                      : fast  ? State::kGood
+                              : State::kNote,
+                      !usable
+                          ? "no permission: copy share/nacre/70-nacre-camera.rules to "
+                            "/etc/udev/rules.d, join plugdev, replug"
+                      : fast ? ""
+                             : "this is no USB 3 port: plug it into a blue one"});
+}
+
 void CheckUsb(const fs::path& root, std::vector<Finding>& findings) {
   const std::size_t before = findings.size();
-  for (const fs::path& device : Entries(root / "sys/bus/usb/devices")) {
+  const std::vector<fs::path> entries = Entries(root / "sys/bus/usb/devices");
+  for (const fs::path& device : entries) {
     CheckUsbDevice(root, device, findings);
   }
-  if (findings.size() == before) {
-    findings.push_back({"usb",
-                        "laser",
-                        "none found",
-                        State::kNote,
-                        "plug in a Helios DAC (1209:e500) to scan with a real laser; "
-                        "simulated rigs need none"});
+  const std::size_t lasers = findings.size();
+  for (const fs::path& interface : entries) {
+    CheckUsbCamera(root, interface, findings);
   }
+  // Cameras are no lasers.
+  std::rotate(findings.begin() + static_cast<std::ptrdiff_t>(before),
+              findings.begin() + static_cast<std::ptrdiff_t>(lasers),
+              findings.end());
+  if (lasers > before) {
+    return;
+  }
+  findings.push_back({"usb",
+                      "laser",
+                      "none found",
+                      State::kNote,
+                      "plug in a Helios DAC (1209:e500) to scan with a real laser; "
+                      "simulated rigs need none"});
 }
 
 }  // namespace

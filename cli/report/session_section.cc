@@ -95,6 +95,9 @@ std::string TargetName(const acquire::SessionReader& session, std::int64_t numbe
 std::vector<std::int64_t> TypicalPictures(const acquire::SessionReader& session) {
   std::vector<std::pair<std::string, std::vector<std::int64_t>>> kinds;
   for (std::int64_t n = 0; n < session.picture_count(); ++n) {
+    if (!session.WasTaken(n)) {
+      continue;
+    }
     const std::string name = TargetName(session, n);
     auto kind = std::find_if(
         kinds.begin(), kinds.end(), [&](const auto& k) { return k.first == name; });
@@ -121,7 +124,15 @@ std::vector<std::int64_t> TypicalPictures(const acquire::SessionReader& session)
 
 std::string FrameFigure(const acquire::SessionReader& session, std::int64_t number) {
   const acquire::Frame frame = session.ReadFrame(number);
-  const std::vector<float> counts(frame.counts.begin(), frame.counts.end());
+  // The mean of what a pixel has.
+  const std::size_t pixels =
+      static_cast<std::size_t>(frame.width) * static_cast<std::size_t>(frame.height);
+  const std::size_t samples = frame.counts.size() / pixels;
+  std::vector<float> counts(pixels, 0.0F);
+  for (std::size_t k = 0; k < frame.counts.size(); ++k) {
+    counts[k / samples] +=
+        static_cast<float>(frame.counts[k]) / static_cast<float>(samples);
+  }
   const OwnedPlane small = Shrink({frame.width, frame.height, counts}, 520);
   const auto [low, high] = std::minmax_element(counts.begin(), counts.end());
   const auto full = static_cast<double>((1 << session.manifest().camera.bit_depth) - 1);
@@ -191,7 +202,7 @@ std::string SessionSection(const std::filesystem::path& folder) {
 }
 
 std::string CalibrationSection(const std::filesystem::path& path) {
-  return Section("Calibration", path.filename().string(), CalibrationBody(path));
+  return Section("Calibration", path.filename().string(), CalibrationBody(path) + CalibrationFigures(path));
 }
 
 }  // namespace nacre::cli::report

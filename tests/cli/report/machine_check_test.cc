@@ -69,6 +69,34 @@ TEST(MachineCheck, OtherUsbDevicesAreNoneOfItsBusiness) {
   EXPECT_NE(Find(findings, "laser"), nullptr);
 }
 
+TEST(MachineCheck, AUsbCameraWithoutPermissionIsAProblem) {
+  const TempFolder root;
+  const std::filesystem::path devices = root / "sys/bus/usb/devices";
+  for (const char* protocol : {"00", "01", "02"}) {  // control, events, frames
+    const auto interface = devices / (std::string("2-1:1.") + protocol[1]);
+    Write(interface / "bInterfaceClass", "ef\n");
+    Write(interface / "bInterfaceSubClass", "05\n");
+    Write(interface / "bInterfaceProtocol", std::string(protocol) + "\n");
+  }
+  Write(devices / "2-1/product", "Some Camera\n");
+  Write(devices / "2-1/busnum", "2\n");
+  Write(devices / "2-1/devnum", "5\n");
+  Write(devices / "2-1/speed", "480\n");
+  std::vector<Finding> findings = CheckMachine(root.path(), root.path());
+  ASSERT_NE(Find(findings, "Some Camera"), nullptr);
+  EXPECT_EQ(Find(findings, "Some Camera")->state, State::kProblem);
+  EXPECT_THAT(Find(findings, "Some Camera")->advice,
+              HasSubstr("70-nacre-camera.rules"));
+  EXPECT_NE(Find(findings, "laser"), nullptr) << "a camera is no laser";
+  Write(root / "dev/bus/usb/002/005", "");
+  findings = CheckMachine(root.path(), root.path());
+  EXPECT_EQ(Find(findings, "Some Camera")->state, State::kNote);
+  EXPECT_THAT(Find(findings, "Some Camera")->advice, HasSubstr("no USB 3 port"));
+  Write(devices / "2-1/speed", "5000\n");
+  findings = CheckMachine(root.path(), root.path());
+  EXPECT_EQ(Find(findings, "Some Camera")->state, State::kGood);
+}
+
 TEST(MachineCheck, InterfacesWithoutJumboFramesGetAHint) {
   const TempFolder root;
   for (const char* name : {"eth0", "eth1", "docker0", "lo"}) {
