@@ -66,14 +66,38 @@ Corners Ordered(Corners corners, cv::Size board, const std::string& where) {
   return corners;
 }
 
+// As it is; then smoothed, since a sharp lens on coarse pixels makes stairs of edges;
+// then at twice the size, for small squares; each time harder.
+bool FindBoard(const cv::Mat& picture, cv::Size board, Corners& corners) {
+  if (cv::findChessboardCornersSB(
+          picture, board, corners, cv::CALIB_CB_NORMALIZE_IMAGE)) {
+    return true;
+  }
+  constexpr int kHard = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
+  constexpr double kSmoothPx = 0.7;
+  cv::Mat smooth;
+  cv::GaussianBlur(picture, smooth, cv::Size(), kSmoothPx);
+  if (cv::findChessboardCornersSB(smooth, board, corners, kHard)) {
+    return true;
+  }
+  cv::Mat large;
+  cv::resize(smooth, large, cv::Size(), 2, 2, cv::INTER_CUBIC);
+  if (!cv::findChessboardCornersSB(large, board, corners, kHard)) {
+    return false;
+  }
+  for (cv::Point2f& corner : corners) {  // pixels' centres are whole numbers
+    corner = (corner + cv::Point2f(0.5F, 0.5F)) * 0.5F - cv::Point2f(0.5F, 0.5F);
+  }
+  return true;
+}
+
 Corners FindCorners(const acquire::SessionReader& session, std::int64_t number) {
   const acquire::TargetsDescription& targets = session.rig().targets;
   const cv::Size board(targets.checkerboard_columns, targets.checkerboard_rows);
   const std::string where = (session.folder() / session.Entry(number).file).string();
   const acquire::Frame frame = session.ReadFrame(number);
   Corners corners;
-  const bool found = cv::findChessboardCornersSB(
-      BytePicture(frame), board, corners, cv::CALIB_CB_NORMALIZE_IMAGE);
+  const bool found = FindBoard(BytePicture(frame), board, corners);
   if (!found) {
     throw BadData(fmt::format(
         "{}: no checkerboard of {} x {} inner corners can be made out in pose {}; see "

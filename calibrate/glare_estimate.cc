@@ -92,11 +92,14 @@ Blooming FindBlooming(const acquire::SessionReader& session,
     const Frame frame = session.ReadFrame(number);
     const std::vector<float> rates = pictures.Rates(frame);
     const auto width = static_cast<std::size_t>(frame.width);
-    const double noise =
-        std::sqrt(pictures.dark().variance_counts2) / frame.exposure_us;
     constexpr double kFarOff = 6;
+    const double variance = pictures.dark().variance_counts2;
     const auto is_swollen = [&](std::size_t k) {
       const double expected = merged.rates[k];
+      // What is expected is a shorter exposure's, and as noisy; a count is an electron
+      // at least.
+      const double t = std::max(merged.exposures[k], 1e-9);
+      const double noise = std::sqrt(variance + std::max(0.0, expected) * t) / t;
       return merged.exposures[k] > 0 &&
              frame.counts[k]<saturation_counts&& static_cast<double>(rates[k]) -
                              expected>

@@ -17,6 +17,9 @@ std::string DatasetSection(const std::filesystem::path& path,
 std::string MaterialSection(const std::filesystem::path& path);
 std::string SessionSection(const std::filesystem::path& folder);
 std::string CalibrationSection(const std::filesystem::path& path);
+/// Warnings and figures of a calibration, for its section; empty if this build was made
+/// without `calibrate`.
+std::string CalibrationFigures(const std::filesystem::path& path);
 
 /// Pictures, EXR or PNG. `css_class` "hero" for the one that a page is about.
 std::string PictureSection(const std::filesystem::path& path);
