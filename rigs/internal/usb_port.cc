@@ -97,6 +97,19 @@ usbdevfs_urb* Urb(UMockdevIoctlData* data) {
   return reinterpret_cast<usbdevfs_urb*>(data->data);
 }
 
+// Of a program that dies meanwhile the memory can't be read, or reads as zeros, which
+// no transfer to a Helios is.
+bool IsWhole(const usbdevfs_urb& urb, const UMockdevIoctlData* buffer) {
+  if (buffer == nullptr || urb.buffer_length <= 0) {
+    return false;
+  }
+  const auto* bytes = static_cast<const std::uint8_t*>(urb.buffer);
+  return (urb.endpoint & 0x80) != 0 ||
+         std::any_of(bytes, bytes + urb.buffer_length, [](std::uint8_t byte) {
+           return byte != 0;
+         });
+}
+
 }  // namespace
 
 bool CanEmulateUsb() {
@@ -197,9 +210,12 @@ struct UsbPort::Parts : std::enable_shared_from_this<UsbPort::Parts> {
                                     offsetof(usbdevfs_urb, buffer),
                                     static_cast<gsize>(Urb(data)->buffer_length),
                                     nullptr);
-    if (buffer != nullptr) {
-      g_object_unref(buffer);  // the transfer holds it
+    if (!IsWhole(*Urb(data), buffer)) {
+      g_object_unref(data);
+      Answer(client, -1, EFAULT);
+      return;
     }
+    g_object_unref(buffer);  // the transfer holds it
     if (claimed_by != client && Urb(data)->type != USBDEVFS_URB_TYPE_CONTROL) {
       g_object_unref(data);
       Answer(client, -1, ENOENT);
@@ -271,6 +287,9 @@ struct UsbPort::Parts : std::enable_shared_from_this<UsbPort::Parts> {
     switch (request) {
       case USBDEVFS_GET_CAPABILITIES: {
         UMockdevIoctlData* data = umockdev_ioctl_data_resolve(argument, 0, 4, nullptr);
+        if (data == nullptr) {
+          return Answer(client, -1, EFAULT);
+        }
         const std::uint32_t capabilities =
             USBDEVFS_CAP_ZERO_PACKET | USBDEVFS_CAP_NO_PACKET_SIZE_LIM |
             USBDEVFS_CAP_BULK_SCATTER_GATHER | USBDEVFS_CAP_REAP_AFTER_DISCONNECT;
