@@ -29,13 +29,29 @@ int Run(const Arguments& args, const Common& common) {
                                options,
                                ConsoleProgress(common));
   Say(common, "reconstructed " + args.session.string() + ": " + summary.Brief());
+  for (const std::string& warning : summary.warnings) {
+    Say(common, "warning: " + warning);
+  }
   Print(common,
         Json{{"file", args.out.string()},
+             {"warnings", summary.warnings},
              {"slices", summary.slice_count},
              {"frames", summary.frame_count},
              {"saturated_pixels", summary.saturated_count},
              {"invalid_values", summary.invalid_count},
              {"max_crosstalk", summary.max_crosstalk},
+             {"windows_overlap", summary.is_dense},
+             {"tail_spread", summary.tail_spread},
+             {"groups", summary.group_count},
+             {"groups_reused", summary.groups_reused},
+             {"groups_missing", summary.groups_missing},
+             {"reciprocity",
+              {{"pairs", summary.reciprocity.pair_count},
+               {"difference", summary.reciprocity.difference},
+               {"noise", summary.reciprocity.noise},
+               {"asymmetry", summary.reciprocity.asymmetry}}},
+             {"symmetrize_change", summary.symmetrize_change},
+             {"symmetrize_worst_total", summary.symmetrize_worst_total},
              {"spot_sigma_mm", summary.spot_sigma_mm},
              {"threads", summary.thread_count_used},
              {"seconds", summary.seconds}},
@@ -54,6 +70,11 @@ std::function<int()> MakeReconstructVerb(CLI::App& app, const Common& common) {
   app.add_option("--memory", args->memory_bytes, "for frames under way, e.g. 512MB")
       ->transform(CLI::AsSizeValue(true))
       ->default_str("512MB");
+  app.add_flag(
+      "--incremental",
+      args->options.incremental,
+      "take a session that isn't complete, and go on from OUT.work of the last "
+      "run: only new pictures are read");
   AddOptions(app, args->options);
   return [args, &common] { return Run(*args, common); };
 }

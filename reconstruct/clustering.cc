@@ -36,48 +36,52 @@ Clustering Relabel(const KMeansResult& result) {
   return clustering;
 }
 
-using Fetch = std::function<RdSlice(std::int64_t)>;
+// Where slices come from. `view` may use `own` to hold one.
+struct Source {
+  std::function<internal::SliceView(std::int64_t s, RdSlice& own)> view;
+};
 
 PointSet MakePoints(const RdHeader& header,
-                    const Fetch& fetch,
+                    const Source& source,
                     const ClusterOptions& options,
                     const ProgressFunction& progress) {
-  std::vector<RdSlice> slices;
+  std::vector<RdSlice> sample;
   for (const std::int64_t s :
        internal::SampleSlices(header.PointCount(), kSampleSlices, options.seed)) {
-    slices.push_back(fetch(s));
+    RdSlice own;
+    const internal::SliceView view = source.view(s, own);
+    sample.push_back({{view.rd.begin(), view.rd.end()},
+                      {view.sigma.begin(), view.sigma.end()},
+                      {view.valid.begin(), view.valid.end()}});
   }
-  const SliceFeatures features(header, slices, options.log_offset, options.dimensions);
+  const SliceFeatures features(header, sample, options.log_offset, options.dimensions);
   PointSet points{{}, header.PointCount(), features.dimensions()};
   points.values.resize(static_cast<std::size_t>(points.count * points.dimensions));
+  std::vector<RdSlice> own(static_cast<std::size_t>(kSlicesAtOnce));
+  std::vector<internal::SliceView> views;
   for (std::int64_t first = 0; first < points.count; first += kSlicesAtOnce) {
     Report(progress, {"cluster", first, points.count, "features"});
     const std::int64_t count = std::min(kSlicesAtOnce, points.count - first);
-    slices.clear();
+    views.clear();
     for (std::int64_t n = 0; n < count; ++n) {
-      slices.push_back(fetch(first + n));
-    }
-    std::vector<const RdSlice*> pointers;
-    for (const RdSlice& slice : slices) {
-      pointers.push_back(&slice);
+      views.push_back(source.view(first + n, own[static_cast<std::size_t>(n)]));
     }
     ParallelForBlocks(count, 16, options.thread_count, [&](auto begin, auto end) {
-      features.Project(
-          std::span(pointers).subspan(static_cast<std::size_t>(begin),
-                                      static_cast<std::size_t>(end - begin)),
-          {points.Row(first + begin),
-           static_cast<std::size_t>((end - begin) * points.dimensions)});
+      features.Project(std::span(views).subspan(static_cast<std::size_t>(begin),
+                                                static_cast<std::size_t>(end - begin)),
+                       {points.Row(first + begin),
+                        static_cast<std::size_t>((end - begin) * points.dimensions)});
     });
   }
   return points;
 }
 
 Clustering Cluster(const RdHeader& header,
-                   const Fetch& fetch,
+                   const Source& source,
                    const ClusterOptions& options,
                    const ProgressFunction& progress) {
   nacre::Validate(options);
-  const PointSet points = MakePoints(header, fetch, options, progress);
+  const PointSet points = MakePoints(header, source, options, progress);
   Report(progress, {"cluster", points.count, points.count, "k-means"});
   const int clusters =
       options.clusters > 0
@@ -100,26 +104,25 @@ Clustering Cluster(const RdHeader& header,
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,
                          const ProgressFunction& progress) {
-  const auto size = dataset.header.SliceSize();
-  const auto fetch = [&](std::int64_t s) {
-    const auto begin = s * size;
-    const auto cut = [&](const auto& values) {
-      return std::remove_cvref_t<decltype(values)>(values.begin() + begin,
-                                                   values.begin() + begin + size);
-    };
-    return RdSlice{cut(dataset.rd), cut(dataset.sigma), cut(dataset.valid)};
+  const auto size = static_cast<std::size_t>(dataset.header.SliceSize());
+  const auto view = [&](std::int64_t s, RdSlice&) {
+    const std::size_t begin = static_cast<std::size_t>(s) * size;
+    return internal::SliceView{std::span(dataset.rd).subspan(begin, size),
+                               std::span(dataset.sigma).subspan(begin, size),
+                               std::span(dataset.valid).subspan(begin, size)};
   };
-  return Cluster(dataset.header, fetch, options, progress);
+  return Cluster(dataset.header, {view}, options, progress);
 }
 
 Clustering ClusterSlices(RdReader& reader,
                          const ClusterOptions& options,
                          const ProgressFunction& progress) {
   const int width = reader.header().points_x;
-  const auto fetch = [&](std::int64_t s) {
-    return reader.ReadSlice(static_cast<int>(s % width), static_cast<int>(s / width));
+  const auto view = [&](std::int64_t s, RdSlice& own) {
+    own = reader.ReadSlice(static_cast<int>(s % width), static_cast<int>(s / width));
+    return internal::ViewOf(own);
   };
-  return Cluster(reader.header(), fetch, options, progress);
+  return Cluster(reader.header(), {view}, options, progress);
 }
 
 }  // namespace nacre::reconstruct

@@ -1,32 +1,39 @@
 #include "reconstruct/reconstruct.h"
 
+#include "calibrate/session_state.h"
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
-#include "reconstruct/internal/crosstalk.h"
-#include "reconstruct/internal/group_slices.h"
-#include "reconstruct/internal/slice_spool.h"
+#include "reconstruct/internal/fill_diagonal.h"
+#include "reconstruct/internal/group_reader.h"
+#include "reconstruct/internal/group_spool.h"
+#include "reconstruct/internal/separation.h"
 #include "reconstruct/internal/spot_width.h"
+#include "reconstruct/internal/symmetrize.h"
+#include "reconstruct/internal/systematics.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fmt/format.h>
-#include <optional>
 
 namespace nacre::reconstruct {
 namespace {
 
-using internal::Crosstalk;
+// One up whenever the same pictures give other values.
+constexpr int kReconstructionVersion = 2;
+
+using internal::GroupPicture;
 using internal::GroupReader;
-using internal::GroupSlices;
-using internal::OutsideCell;
-using internal::SliceSpool;
+using internal::GroupSpool;
+using internal::Separation;
 
 void CheckSameRig(const acquire::SessionReader& session,
-                  const calibrate::Calibration& calibration) {
+                  const calibrate::Calibration& calibration,
+                  bool may_be_incomplete) {
   const acquire::SessionManifest& manifest = session.manifest();
   if (calibration.session_rig_hash != manifest.rig_hash) {
     throw BadData(fmt::format(
@@ -47,15 +54,24 @@ void CheckSameRig(const acquire::SessionReader& session,
                     calibration.camera.width_px,
                     calibration.camera.height_px));
   }
+  if (!manifest.camera.mosaic.empty()) {
+    throw BadData(
+        fmt::format("{}: pictures in colour ({}) aren't reconstructed: capture in a "
+                    "monochrome pixel "
+                    "format, a laser channel at a time",
+                    session.folder().string(),
+                    manifest.camera.mosaic));
+  }
   if (std::ssize(calibration.channels) != session.rig().ChannelCount()) {
     throw BadData(fmt::format("{}: {} laser channels, the calibration has {}",
                               session.folder().string(),
                               session.rig().ChannelCount(),
                               calibration.channels.size()));
   }
-  if (!session.IsComplete()) {
+  if (!session.IsComplete() && !may_be_incomplete) {
     throw BadData(fmt::format(
-        "{}: {} of {} pictures were taken; go on with nacre capture --resume",
+        "{}: {} of {} pictures were taken; go on with nacre capture --resume, or take "
+        "what is there with --incremental",
         session.folder().string(),
         session.picture_count(),
         session.schedule().size()));
@@ -86,128 +102,239 @@ RdHeader HeaderOf(const acquire::SessionReader& session,
   return header;
 }
 
+// The plane as far as it is known: none if noise alone may have made it, and else in
+// steps that matter to nothing, so that a few more pictures don't move it and what was
+// made of the others can stay.
+calibrate::SamplePlane Settle(calibrate::SamplePlane plane) {
+  constexpr double kSigmas = 4;
+  constexpr double kHeightStepMm = 0.02;
+  constexpr double kSlopeStep = 2e-4;
+  const double slope = std::hypot(plane.slope_x, plane.slope_y);
+  if (std::abs(plane.height_mm) < kSigmas * plane.height_sigma_mm + kHeightStepMm &&
+      slope < kSigmas * plane.slope_sigma + kSlopeStep) {
+    return {};
+  }
+  plane.height_mm = std::round(plane.height_mm / kHeightStepMm) * kHeightStepMm;
+  plane.slope_x = std::round(plane.slope_x / kSlopeStep) * kSlopeStep;
+  plane.slope_y = std::round(plane.slope_y / kSlopeStep) * kSlopeStep;
+  return plane;
+}
+
 // As many groups side by side as the memory is for, and no more than threads.
+// Cutting pixels into cells took memory that the heap keeps.
 int GroupsAtOnce(const GroupReader& reader, const ReconstructOptions& options) {
-  const double left = options.memory_bytes - static_cast<double>(reader.SharedBytes());
-  const double affordable = left / static_cast<double>(reader.WorkingBytes());
+  constexpr double kCuttingBytesAWorkingByte = 4;
+  const double left =
+      options.memory_bytes - static_cast<double>(reader.SharedBytes()) -
+      kCuttingBytesAWorkingByte * static_cast<double>(reader.WorkingBytes());
+  const double affordable =
+      left / static_cast<double>(reader.WorkingBytes() + reader.ResultBytes());
   return static_cast<int>(
       std::clamp<double>(affordable, 1, ThreadCount(options.thread_count)));
 }
 
-std::filesystem::path AbsoluteFolder(const std::filesystem::path& path) {
-  return std::filesystem::absolute(path).parent_path();
+std::filesystem::path WorkFile(const std::filesystem::path& out) {
+  return std::filesystem::absolute(out).string() + ".work";
 }
 
-// Pass 1: pictures to slices, as measured, parked in `spool`.
-void Measure(const acquire::SessionReader& session,
-             const calibrate::Calibration& calibration,
+// All that the pictures of the groups depend on, beside the pictures themselves. The
+// calibration is hashed as it would be written.
+std::uint64_t KeyOf(const acquire::SessionReader& session,
+                    const calibrate::Calibration& calibration,
+                    const std::filesystem::path& work,
+                    double spot_sigma_mm) {
+  const std::filesystem::path written = work.string() + ".calibration.json";
+  calibrate::WriteCalibration(written, calibration);
+  const std::string hash = HashFile(written);
+  std::filesystem::remove(written);
+  const std::string text =
+      fmt::format("{} {} {} {}",
+                  kReconstructionVersion,
+                  session.manifest().rig_hash,
+                  hash,  // of the camera over the sample's plane too
+                  spot_sigma_mm);
+  return Hash64(text.data(), text.size());
+}
+
+// Pass 1: pictures to the lattice, parked in `spool`. Which thread does what doesn't
+// matter: each group has its own place.
+void Measure(const GroupReader& reader,
              const ReconstructOptions& options,
-             const RdHeader& header,
-             SliceSpool& spool,
-             std::vector<OutsideCell>& outside,
+             GroupSpool& spool,
              ReconstructSummary& summary,
              const ProgressFunction& progress) {
-  const GroupReader reader(
-      session, calibration, header, summary.spot_sigma_mm, options.thread_count);
-  const int groups = session.schedule().group_count();
-  const int at_once = GroupsAtOnce(reader, options);
-  summary.thread_count_used = at_once;
-  for (int first = 0; first < groups; first += at_once) {
-    Report(progress, {"reconstruct", first, groups, "pictures"});
-    const int count = std::min(at_once, groups - first);
-    std::vector<GroupSlices> results(static_cast<std::size_t>(count));
-    ParallelFor(count, at_once, [&](std::int64_t k) {
-      results[static_cast<std::size_t>(k)] = reader.Read(first + static_cast<int>(k));
-    });
-    for (int k = 0; k < count; ++k) {
-      const GroupSlices& result = results[static_cast<std::size_t>(k)];
-      const auto spots = session.schedule().Group(first + k);
-      for (std::size_t n = 0; n < spots.size(); ++n) {
-        spool.Park(std::int64_t{spots[n].j} * header.points_x + spots[n].i,
-                   result.slices[n]);
-      }
-      outside.insert(outside.end(), result.outside.begin(), result.outside.end());
-      summary.frame_count += result.frame_count;
-      summary.saturated_count += result.saturated_count;
-      summary.invalid_count += result.invalid_count;
-      summary.slice_count += std::ssize(spots);
+  std::vector<int> wanted;
+  for (int g = 0; g < static_cast<int>(summary.group_count); ++g) {
+    if (!reader.IsThere(g)) {
+      ++summary.groups_missing;
+    } else if (options.incremental && spool.TakeUp(g, reader.StateOf(g))) {
+      ++summary.groups_reused;
+    } else {
+      wanted.push_back(g);
     }
   }
-  Report(progress, {"reconstruct", groups, groups, "pictures"});
+  const int at_once = GroupsAtOnce(reader, options);
+  summary.thread_count_used = at_once;
+  const auto total = std::ssize(wanted);
+  // Long enough that waiting for the last of a batch doesn't cost, short enough to
+  // stop.
+  const std::int64_t batch = 8 * at_once;
+  for (std::int64_t first = 0; first < total; first += batch) {
+    Report(progress, {"reconstruct", first, total, "pictures"});
+    const std::int64_t count = std::min(batch, total - first);
+    ParallelFor(count, at_once, [&](std::int64_t k) {
+      const int g = wanted[static_cast<std::size_t>(first + k)];
+      spool.Park(g, reader.StateOf(g), reader.Read(g));
+    });
+  }
+  Report(progress, {"reconstruct", total, total, "pictures"});
+  for (const int g : wanted) {
+    summary.frame_count += spool.FrameCount(g);
+    summary.saturated_count += spool.SaturatedCount(g);
+  }
 }
 
 // Pass 2: slices, freed of each other's light, in the order of the file.
-void WriteSlices(const acquire::SessionReader& session,
+void WriteSlices(const calibrate::Calibration& calibration,
                  const ReconstructOptions& options,
                  const RdHeader& header,
-                 const SliceSpool& spool,
-                 const std::vector<OutsideCell>& outside,
+                 const Separation& separation,
                  RdWriter& writer,
                  ReconstructSummary& summary,
                  const ProgressFunction& progress) {
-  std::optional<Crosstalk> crosstalk;
-  if (options.subtract_crosstalk) {
-    Report(progress, {"crosstalk", 0, header.points_y, "tails"});
-    crosstalk.emplace(header, session.schedule(), spool, outside, options.thread_count);
-  }
   const auto width = static_cast<std::size_t>(header.points_x);
+  internal::SymmetrizeChange change;
   for (int j = 0; j < header.points_y; ++j) {
-    Report(progress, {"crosstalk", j, header.points_y, "slices"});
+    Report(progress, {"reconstruct", j, header.points_y, "slices"});
     constexpr std::size_t kSlicesAtOnce = 64;
     for (std::size_t first = 0; first < width; first += kSlicesAtOnce) {
       const std::size_t count = std::min(kSlicesAtOnce, width - first);
       std::vector<RdSlice> slices(count);
       std::vector<double> shares(count, 0.0);
+      std::vector<internal::SymmetrizeChange> changes(count);
       ParallelFor(std::ssize(slices), options.thread_count, [&](std::int64_t n) {
         const auto k = static_cast<std::size_t>(n);
         const std::int64_t s =
             std::int64_t{j} * header.points_x + static_cast<std::int64_t>(first + k);
-        slices[k] = crosstalk ? crosstalk->Clean(s, &shares[k]) : spool.Fetch(s);
+        slices[k] = separation.Slice(s, &shares[k]);
+        if (options.symmetrize) {
+          changes[k] = internal::Symmetrize(header, separation, s, slices[k]);
+        }
+        if (options.specular_radius_cells >= 0) {
+          internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
+        }
+        if (options.state_systematics) {
+          internal::AddSystematics(header, calibration, slices[k]);
+        }
       });
       for (std::size_t k = 0; k < count; ++k) {
         writer.WriteSlice(static_cast<int>(first + k), j, slices[k]);
         summary.max_crosstalk = std::max(summary.max_crosstalk, shares[k]);
+        summary.invalid_count +=
+            std::count(slices[k].valid.begin(), slices[k].valid.end(), 0);
+        change.Add(changes[k]);
       }
     }
   }
-  Report(progress, {"crosstalk", header.points_y, header.points_y, "slices"});
+  summary.symmetrize_change = change.Share();
+  summary.symmetrize_worst_total = change.worst_total;
+  Report(progress, {"reconstruct", header.points_y, header.points_y, "slices"});
+}
+
+double SpotSigmaMm(const acquire::SessionReader& session,
+                   const calibrate::Calibration& calibration) {
+  const auto& spots = calibration.corrections.spots;
+  if (spots.empty()) {
+    return internal::MeasureSpotSigmaMm(session, calibration);
+  }
+  double variance = 0;
+  for (const calibrate::SpotProfile& spot : spots) {
+    variance += 0.5 * (spot.xx_mm2 + spot.yy_mm2) / static_cast<double>(spots.size());
+  }
+  return std::sqrt(std::max(0.0, variance));
 }
 
 }  // namespace
 
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
-                               const calibrate::Calibration& calibration,
+                               const calibrate::Calibration& of_rig,
                                const std::filesystem::path& out,
                                const ReconstructOptions& options,
                                const ProgressFunction& progress) {
   nacre::Validate(options);
   const auto start = std::chrono::steady_clock::now();
-  CheckSameRig(session, calibration);
+  CheckSameRig(session, of_rig, options.incremental);
+  calibrate::SessionState state = calibrate::ExamineSession(session, of_rig);
+  state.plane = Settle(state.plane);
+  calibrate::Calibration calibration = of_rig;
+  calibration.camera = of_rig.camera.OnPlane(state.plane);
   const RdHeader header = HeaderOf(session, calibration, options);
   ReconstructSummary summary;
-  summary.spot_sigma_mm =
-      options.sharpen_spot ? internal::MeasureSpotSigmaMm(session, calibration) : 0;
+  summary.spot_sigma_mm = options.sharpen_spot ? SpotSigmaMm(session, of_rig) : 0;
+  summary.group_count = session.schedule().group_count();
+  summary.slice_count = header.PointCount();
   RdWriter writer(out, header);
-  SliceSpool spool(AbsoluteFolder(out), header);
-  std::vector<OutsideCell> outside;
-  Measure(session, calibration, options, header, spool, outside, summary, progress);
-  WriteSlices(session, options, header, spool, outside, writer, summary, progress);
+  for (const calibrate::Warning& warning : state.warnings) {
+    summary.warnings.push_back(warning.name + ": " + warning.text);
+  }
+  const GroupReader reader(
+      session, calibration, state, header, summary.spot_sigma_mm, options.thread_count);
+  const std::filesystem::path work = WorkFile(out);
+  GroupSpool spool(
+      work,
+      options.incremental,
+      {.key = KeyOf(session, calibration, work, summary.spot_sigma_mm),
+       .group_count = summary.group_count,
+       .value_count = reader.lattice().CellCount() * std::ssize(header.channels)});
+  Measure(reader, options, spool, summary, progress);
+
+  Separation separation(
+      header, session.schedule(), reader, spool, options.thread_count);
+  if (options.subtract_crosstalk) {
+    Report(progress, {"reconstruct", 0, header.points_y, "tails"});
+    separation.FitTails();
+    for (int c = 0; c < static_cast<int>(std::ssize(header.channels)); ++c) {
+      summary.tail_spread.push_back(static_cast<double>(separation.Spread(c)));
+    }
+  }
+  summary.is_dense = separation.IsDense();
+  WriteSlices(calibration, options, header, separation, writer, summary, progress);
   writer.Finish();
+  RdReader written(out);
+  summary.reciprocity = MeasureReciprocity(written);
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }
 
 std::string ReconstructSummary::Brief() const {
-  return fmt::format(
+  std::string text = fmt::format(
       "{} slices of {} frames in {:.1f} s; {} pixels saturated, {} values invalid, "
-      "crosstalk at most {:.2g} of a slice",
+      "other spots' light at most {:.2g} of a slice{}; R_d(a, b) and R_d(b, a) differ "
+      "by "
+      "{:.2g} beyond noise",
       slice_count,
       frame_count,
       seconds,
       saturated_count,
       invalid_count,
-      max_crosstalk);
+      max_crosstalk,
+      is_dense ? " (windows overlap)" : "",
+      reciprocity.asymmetry);
+  if (groups_reused > 0 || groups_missing > 0) {
+    text +=
+        fmt::format("; of {} groups of spots {} from an earlier run, {} not captured",
+                    group_count,
+                    groups_reused,
+                    groups_missing);
+  }
+  if (symmetrize_change > 0) {
+    text +=
+        fmt::format("; averaging both changed values by {:.2g}, totals by up to {:.2g}",
+                    symmetrize_change,
+                    symmetrize_worst_total);
+  }
+  return text;
 }
 
 }  // namespace nacre::reconstruct

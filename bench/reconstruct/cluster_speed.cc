@@ -215,11 +215,11 @@ void CompareAssignments(const RdDataset& dataset, int k, int restarts) {
   const internal::SliceFeatures features(dataset.header, sample, 0.003, 24);
   PointSet points{{}, dataset.header.PointCount(), features.dimensions()};
   points.values.resize(static_cast<std::size_t>(points.count * points.dimensions));
-  std::vector<const RdSlice*> pointers;
+  std::vector<internal::SliceView> views;
   for (const RdSlice& slice : slices) {
-    pointers.push_back(&slice);
+    views.push_back(internal::ViewOf(slice));
   }
-  features.Project(pointers, points.values);
+  features.Project(views, points.values);
   for (const int clusters : {k, 4 * k, 16 * k}) {
     double seconds[2];
     internal::KMeansResult results[2];

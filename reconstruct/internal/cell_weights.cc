@@ -10,6 +10,8 @@ namespace {
 // far below this share of a cell.
 constexpr double kFullCover = 0.999;
 
+constexpr int kLanes = 16;  // pixels a vector
+
 // A symmetric filter of five pixels along each axis: undoes a Gaussian blur of variance
 // σ² in pixels. To fourth order in the derivatives that is
 // 1 − σ²/2 ∂² + σ⁴/8 ∂⁴, and ∂² = D₂ − D₄/12 by differences of pixels.
@@ -64,19 +66,27 @@ class WeightBox {
     }
   }
 
-  // Calls visit(pixel, weight); what lies beyond the picture's rim is its rim.
+  // The rows of the box that lie in the picture, as visit(row, first column, weights);
+  // what lies beyond the picture's rim is its rim.
   template <class Visit>
-  void ForEach(const calibrate::CameraGeometry& camera, Visit&& visit) const {
-    constexpr double kNothing = 1e-9;
-    for (int y = 0; y < height_; ++y) {
-      for (int x = 0; x < width_; ++x) {
-        const double weight = weights_[Index(x, y)];
-        if (std::abs(weight) > kNothing) {
-          visit(std::clamp(top_ + y, 0, camera.height_px - 1) * camera.width_px +
-                    std::clamp(left_ + x, 0, camera.width_px - 1),
-                weight);
+  void ForEachRow(const calibrate::CameraGeometry& camera, Visit&& visit) const {
+    const int left = std::clamp(left_, 0, camera.width_px - 1);
+    const int right = std::clamp(left_ + width_ - 1, left, camera.width_px - 1);
+    const int top = std::clamp(top_, 0, camera.height_px - 1);
+    const int bottom = std::clamp(top_ + height_ - 1, top, camera.height_px - 1);
+    std::vector<float> row(static_cast<std::size_t>(right - left + 1));
+    for (int to = top; to <= bottom; ++to) {
+      std::fill(row.begin(), row.end(), 0.0F);
+      for (int y = 0; y < height_; ++y) {
+        if (std::clamp(top_ + y, top, bottom) != to) {
+          continue;
+        }
+        for (int x = 0; x < width_; ++x) {
+          row[static_cast<std::size_t>(std::clamp(left_ + x, left, right) - left)] +=
+              static_cast<float>(weights_[Index(x, y)]);
         }
       }
+      visit(to, left, row);
     }
   }
 
@@ -135,10 +145,11 @@ double StepMm(const calibrate::CameraGeometry& camera, double dx, double dy) {
 CellWeights::CellWeights(const CellLattice& lattice,
                          const calibrate::CameraGeometry& camera,
                          double spot_sigma_mm,
-                         int thread_count)
+                         int thread_count,
+                         const PlaceOnLattice& place)
     : lattice_(lattice) {
   const std::vector<std::vector<PixelPiece>> rows =
-      CutPixels(lattice, camera, thread_count);
+      CutPixels(lattice, camera, place, thread_count);
   const auto cells = static_cast<std::size_t>(lattice.CellCount());
   // Pieces by cell (counting sort: within a cell they keep the order of the pixels).
   std::vector<std::size_t> first(cells + 1, 0);
@@ -163,43 +174,125 @@ CellWeights::CellWeights(const CellLattice& lattice,
   };
   const Sharpener along_x(variance_px2(1, 0));
   const Sharpener along_y(variance_px2(0, 1));
-  covered_.resize(cells);
-  begin_.assign(1, 0);
+  boxes_.resize(cells);
+  // Rows begin where a whole number of vectors still lies in the picture.
+  const std::int64_t pixels = std::int64_t{camera.width_px} * camera.height_px;
   for (std::size_t cell = 0; cell < cells; ++cell) {
     double covered = 0;
     for (std::size_t n = first[cell]; n < first[cell + 1]; ++n) {
       covered += pieces[n]->share;
     }
-    covered_[cell] = covered >= kFullCover ? 1 : 0;
-    if (covered_[cell] != 0) {
-      WeightBox box(&pieces[first[cell]], first[cell + 1] - first[cell]);
-      box.Sharpen(along_x, along_y);
-      box.ForEach(camera, [&](int pixel, double weight) {
-        shares_.push_back(
-            {static_cast<std::uint32_t>(pixel), static_cast<float>(weight / covered)});
-      });
+    if (covered < kFullCover) {
+      continue;
     }
-    begin_.push_back(shares_.size());
+    WeightBox box(&pieces[first[cell]], first[cell + 1] - first[cell]);
+    box.Sharpen(along_x, along_y);
+    Box& own = boxes_[cell];
+    own.first_row = rows_.size();
+    own.first_weight = weights_.size();
+    box.ForEachRow(camera, [&](int row, int left, const std::vector<float>& weights) {
+      const auto width = static_cast<int>(weights.size());
+      own.row_width = (width + kLanes - 1) / kLanes * kLanes;
+      const std::int64_t wanted = std::int64_t{row} * camera.width_px + left;
+      const std::int64_t start =
+          std::max<std::int64_t>(0, std::min(wanted, pixels - own.row_width));
+      rows_.push_back(static_cast<std::uint32_t>(start));
+      ++own.row_count;
+      const std::size_t at = weights_.size();
+      weights_.resize(at + static_cast<std::size_t>(own.row_width), 0.0F);
+      for (int x = 0; x < width; ++x) {
+        weights_[at + static_cast<std::size_t>(wanted - start + x)] =
+            weights[static_cast<std::size_t>(x)] / static_cast<float>(covered);
+      }
+    });
+  }
+}
+
+namespace {
+
+struct Sums {
+  float mean[kLanes] = {};
+  float variance[kLanes] = {};
+  float least[kLanes] = {};  // below 0: a pixel isn't usable
+};
+
+// One row of a box, whole vectors.
+[[gnu::always_inline]] inline void AddRow(const float* __restrict weight,
+                                          const float* __restrict rate,
+                                          const float* __restrict variance,
+                                          int width,
+                                          Sums& sums) {
+  for (int x = 0; x < width; x += kLanes) {
+    for (int lane = 0; lane < kLanes; ++lane) {
+      const float w = weight[x + lane];
+      const float share = w * w * variance[x + lane];
+      sums.mean[lane] += w * rate[x + lane];
+      sums.variance[lane] += share;
+      sums.least[lane] = std::min(sums.least[lane], share);
+    }
+  }
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void SumBox(
+    const std::uint32_t* __restrict rows,
+    const float* __restrict weights,
+    std::pair<int, int> count_width,
+    const RateFrame& frame,
+    float* __restrict results) {
+  Sums sums;
+  const auto [count, width] = count_width;
+  for (int row = 0; row < count; ++row) {
+    AddRow(weights + static_cast<std::ptrdiff_t>(row) * width,
+           frame.rate.data() + rows[row],
+           frame.variance.data() + rows[row],
+           width,
+           sums);
+  }
+  float mean = 0;
+  float variance = 0;
+  float least = 0;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    mean += sums.mean[lane];
+    variance += sums.variance[lane];
+    least = std::min(least, sums.least[lane]);
+  }
+  results[0] = least < 0 ? 0.0F : mean;
+  results[1] = least < 0 ? -1.0F : variance;
+}
+
+}  // namespace
+
+void CellWeights::Means(const RateFrame& frame,
+                        std::int64_t first,
+                        std::span<float> means,
+                        std::span<float> variances) const {
+  for (std::size_t k = 0; k < means.size(); ++k) {
+    const Box& box = boxes_[static_cast<std::size_t>(first) + k];
+    float results[2] = {0.0F, -1.0F};
+    if (box.row_count > 0) {
+      SumBox(&rows_[box.first_row],
+             &weights_[box.first_weight],
+             {box.row_count, box.row_width},
+             frame,
+             results);
+    }
+    means[k] = results[0];
+    variances[k] = results[1];
   }
 }
 
 CellWeights::Value CellWeights::Mean(const RateFrame& frame, std::int64_t cell) const {
-  const auto c = static_cast<std::size_t>(cell);
-  Value value;
-  value.valid = covered_[c] != 0;
-  for (std::size_t n = begin_[c]; n < begin_[c + 1]; ++n) {
-    const auto weight = static_cast<double>(shares_[n].weight);
-    const auto variance = static_cast<double>(frame.variance[shares_[n].pixel]);
-    value.valid = value.valid && variance >= 0;
-    value.mean += weight * static_cast<double>(frame.rate[shares_[n].pixel]);
-    value.variance += weight * weight * variance;
-  }
-  return value.valid ? value : Value{};
+  float mean = 0;
+  float variance = 0;
+  Means(frame, cell, {&mean, 1}, {&variance, 1});
+  return {static_cast<double>(mean),
+          static_cast<double>(std::max(0.0F, variance)),
+          variance >= 0};
 }
 
 std::size_t CellWeights::MemoryBytes() const {
-  return begin_.size() * sizeof(std::size_t) + shares_.size() * sizeof(Share) +
-         covered_.size();
+  return boxes_.size() * sizeof(Box) + rows_.size() * sizeof(rows_[0]) +
+         weights_.size() * sizeof(float);
 }
 
 }  // namespace nacre::reconstruct::internal

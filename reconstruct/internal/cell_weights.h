@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace nacre::reconstruct::internal {
@@ -21,7 +22,8 @@ class CellWeights {
   CellWeights(const CellLattice& lattice,
               const calibrate::CameraGeometry& camera,
               double spot_sigma_mm,
-              int thread_count);
+              int thread_count,
+              const PlaceOnLattice& place = {});
 
   const CellLattice& lattice() const { return lattice_; }
 
@@ -34,18 +36,28 @@ class CellWeights {
   /// saturated.
   Value Mean(const RateFrame& frame, std::int64_t cell) const;
 
+  /// The same for cells `first` to `first` + means.size(); a variance below 0 marks
+  /// those that aren't valid, whose mean is 0.
+  void Means(const RateFrame& frame,
+             std::int64_t first,
+             std::span<float> means,
+             std::span<float> variances) const;
+
   std::size_t MemoryBytes() const;
 
  private:
-  struct Share {
-    std::uint32_t pixel;
-    float weight;
+  // A cell's weights are a box of pixels, each row padded to whole vectors.
+  struct Box {
+    std::size_t first_row = 0;     // in rows_
+    std::size_t first_weight = 0;  // in weights_
+    int row_count = 0;             // 0: the camera doesn't see all of the cell
+    int row_width = 0;
   };
 
   CellLattice lattice_;
-  std::vector<std::size_t> begin_;  // of a cell's shares; and the end of the last
-  std::vector<Share> shares_;
-  std::vector<char> covered_;
+  std::vector<Box> boxes_;
+  std::vector<std::uint32_t> rows_;  // the first pixel of each row of each box
+  std::vector<float> weights_;
 };
 
 }  // namespace nacre::reconstruct::internal

@@ -23,13 +23,26 @@ struct Bracket {
   float dark_counts;
   float shorter_us;  ///< sum of the shorter exposures
   float order;       ///< 0 for the shortest, 1 for the next, …
+  float floor;       ///< variance without light, counts²
+  float room;        ///< linear counts between dark and saturation
 };
 
-// The noise model of the calibration: variance = signal · slope + floor.
+// The noise model of the calibration: variance = signal · slope + floor; and the
+// response's curvature, linear = counts (1 + b1 counts + b2 counts²).
 struct Noise {
   float slope;
-  float floor;
   float saturation_counts;
+  float b1;
+  float b2;
+
+  [[gnu::always_inline]] float Linear(float counts) const {
+    return counts * (1.0F + counts * (b1 + counts * b2));
+  }
+  // What the curvature makes of a variance, to first order.
+  [[gnu::always_inline]] float Stretch(float counts) const {
+    const float slope_there = 1.0F + counts * (2 * b1 + 3 * counts * b2);
+    return slope_there * slope_there;
+  }
 };
 
 // Sums over the exposures that a pixel can use, shortest first; the first unusable one
@@ -52,18 +65,18 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddBracket(
   constexpr float kMargin2 = kMarginSigmas * kMarginSigmas;
   for (std::size_t k = 0; k < count; ++k) {
     const auto raw = static_cast<float>(bracket.counts[k]);
-    const float above = raw - bracket.dark_counts;
+    const float above = noise.Linear(raw - bracket.dark_counts);
     const float expected = std::max(0.0F, sums.signal[k]) * ratio;
     const float variance =
-        sums.variance[k] * ratio * ratio + expected * noise.slope + noise.floor;
-    const float room = noise.saturation_counts - bracket.dark_counts - expected;
+        sums.variance[k] * ratio * ratio + expected * noise.slope + bracket.floor;
+    const float room = bracket.room - expected;
     // Conditions as 0 and 1, which the compiler makes masks of.
     const float far = room * std::abs(room) > kMargin2 * variance ? 1.0F : first;
     const float dark = raw < noise.saturation_counts ? 1.0F : 0.0F;
     const float going_on = sums.used[k] == bracket.order ? 1.0F : 0.0F;
     const float one = far * dark * going_on;
     sums.signal[k] += one * above;
-    sums.variance[k] += one * (std::max(0.0F, above) * noise.slope + noise.floor);
+    sums.variance[k] += one * (std::max(0.0F, above) * noise.slope + bracket.floor);
     sums.used[k] += one;
     sums.exposure_us[k] += one * bracket.exposure_us;
   }
@@ -76,9 +89,12 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddWeighted(
   const float t = bracket.exposure_us;
   for (std::size_t k = 0; k < count; ++k) {
     const float one = sums.used[k] > bracket.order ? 1.0F : 0.0F;
+    const float expected = sums.pooled_rate[k] * t;
     const float weight =
-        one * t * t / (sums.pooled_rate[k] * t * noise.slope + noise.floor);
-    const float above = static_cast<float>(bracket.counts[k]) - bracket.dark_counts;
+        one * t * t /
+        ((expected * noise.slope + bracket.floor) * noise.Stretch(expected));
+    const float above =
+        noise.Linear(static_cast<float>(bracket.counts[k]) - bracket.dark_counts);
     sums.weight[k] += weight;
     sums.weighted_rate[k] += weight * (above / t);
   }
@@ -114,19 +130,97 @@ void MergeBlock(std::span<const Bracket> brackets,
   merged.saturated_count += static_cast<std::int64_t>(saturated);
 }
 
-}  // namespace
+// Counts beside pixels that overflow hold what spilt over: they are made to look
+// saturated, which leaves them out.
+void SpreadSaturation(const calibrate::Blooming& blooming,
+                      double saturation_counts,
+                      acquire::Frame& frame) {
+  constexpr std::uint16_t kFull = 0xFFFF;
+  const auto mark = [&](int x, int y) {
+    if (x >= 0 && x < frame.width && y >= 0 && y < frame.height) {
+      frame.counts[static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) +
+                   static_cast<std::size_t>(x)] = kFull;
+    }
+  };
+  std::vector<std::size_t> full;
+  for (std::size_t k = 0; k < frame.counts.size(); ++k) {
+    if (static_cast<double>(frame.counts[k]) >= saturation_counts) {
+      full.push_back(k);
+    }
+  }
+  for (const std::size_t k : full) {
+    const int x = static_cast<int>(k) % frame.width;
+    const int y = static_cast<int>(k) / frame.width;
+    for (int d = -blooming.reach_px; d <= blooming.reach_px; ++d) {
+      mark(x, y + d);
+    }
+    for (int d = -blooming.side_reach_px; d <= blooming.side_reach_px; ++d) {
+      mark(x + d, y);
+    }
+  }
+}
 
-RateFrame MergeExposures(std::span<const acquire::Frame> frames,
-                         const calibrate::Calibration& calibration) {
-  Expect(!frames.empty(), "at least one exposure");
+bool AnySaturated(std::span<const acquire::Frame> frames, double saturation_counts) {
+  std::uint16_t most = 0;
+  for (const acquire::Frame& frame : frames) {
+    for (const std::uint16_t counts : frame.counts) {
+      most = most < counts ? counts : most;
+    }
+  }
+  return static_cast<double>(most) >= saturation_counts;
+}
+
+// A hot pixel's noise is beyond the model; what its neighbours saw stands for it.
+void FillHotPixels(const calibrate::Calibration& calibration, RateFrame& rates) {
+  const int width = calibration.camera.width_px;
+  const auto pixels = static_cast<std::int64_t>(rates.rate.size());
+  std::vector<char> hot(rates.rate.size(), 0);
+  for (const calibrate::HotPixel& pixel : calibration.corrections.hot_pixels) {
+    hot[static_cast<std::size_t>(pixel.index)] = 1;
+  }
+  for (const calibrate::HotPixel& pixel : calibration.corrections.hot_pixels) {
+    float rate = 0;
+    float variance = 0;
+    float count = 0;
+    const auto add = [&](std::int64_t k) {
+      if (k >= 0 && k < pixels && hot[static_cast<std::size_t>(k)] == 0 &&
+          rates.variance[static_cast<std::size_t>(k)] >= 0) {
+        rate += rates.rate[static_cast<std::size_t>(k)];
+        variance += rates.variance[static_cast<std::size_t>(k)];
+        count += 1;
+      }
+    };
+    const int x = pixel.index % width;
+    if (x > 0 && x + 1 < width) {
+      add(pixel.index - 1);
+      add(pixel.index + 1);
+    }
+    add(pixel.index - width);
+    add(pixel.index + width);
+    const auto at = static_cast<std::size_t>(pixel.index);
+    rates.rate[at] = count > 0 ? rate / count : 0.0F;
+    rates.variance[at] = count > 0 ? variance / count : -1.0F;
+  }
+}
+
+std::vector<Bracket> MakeBrackets(std::span<const acquire::Frame> frames,
+                                  const calibrate::Calibration& calibration) {
+  const calibrate::Corrections& corrections = calibration.corrections;
   std::vector<Bracket> brackets;
   for (const acquire::Frame& frame : frames) {
     Expect(frame.counts.size() == frames[0].counts.size(), "frames of one size");
+    const double dark = calibration.dark.Counts(frame.exposure_us);
+    const double spread = corrections.dark_spread_counts_per_us * frame.exposure_us;
+    const double floor = calibration.VarianceCounts2(0) + spread * spread +
+                         corrections.row_noise_counts * corrections.row_noise_counts;
     brackets.push_back({frame.counts.data(),
                         static_cast<float>(frame.exposure_us),
-                        static_cast<float>(calibration.dark.Counts(frame.exposure_us)),
+                        static_cast<float>(dark),
                         0.0F,
-                        0.0F});
+                        0.0F,
+                        static_cast<float>(floor),
+                        static_cast<float>(corrections.linearity.Linear(
+                            calibration.saturation_counts - dark))});
   }
   std::stable_sort(brackets.begin(), brackets.end(), [](const auto& a, const auto& b) {
     return a.exposure_us < b.exposure_us;
@@ -135,16 +229,42 @@ RateFrame MergeExposures(std::span<const acquire::Frame> frames,
     brackets[b].shorter_us = brackets[b - 1].shorter_us + brackets[b - 1].exposure_us;
     brackets[b].order = static_cast<float>(b);
   }
-  const double floor = calibration.VarianceCounts2(0);
-  const Noise noise{static_cast<float>(calibration.VarianceCounts2(1) - floor),
-                    static_cast<float>(floor),
-                    static_cast<float>(calibration.saturation_counts)};
-  const std::size_t pixels = frames[0].counts.size();
-  RateFrame merged{std::vector<float>(pixels), std::vector<float>(pixels)};
-  for (std::size_t begin = 0; begin < pixels; begin += kBlock) {
-    MergeBlock(brackets, noise, begin, std::min(kBlock, pixels - begin), merged);
+  return brackets;
+}
+
+}  // namespace
+
+void MergeExposures(std::span<const acquire::Frame> frames,
+                    const calibrate::Calibration& calibration,
+                    RateFrame& rates) {
+  Expect(!frames.empty(), "at least one exposure");
+  const calibrate::Corrections& corrections = calibration.corrections;
+  std::vector<acquire::Frame> spread;
+  const bool blooms =
+      corrections.blooming.reach_px > 0 || corrections.blooming.side_reach_px > 0;
+  if (blooms && AnySaturated(frames, calibration.saturation_counts)) {
+    spread.assign(frames.begin(), frames.end());
+    for (acquire::Frame& frame : spread) {
+      SpreadSaturation(corrections.blooming, calibration.saturation_counts, frame);
+    }
+    frames = spread;
   }
-  return merged;
+  const std::vector<Bracket> brackets = MakeBrackets(frames, calibration);
+  const Noise noise{static_cast<float>(calibration.VarianceCounts2(1) -
+                                       calibration.VarianceCounts2(0)),
+                    static_cast<float>(calibration.saturation_counts),
+                    static_cast<float>(corrections.linearity.b1_per_count),
+                    static_cast<float>(corrections.linearity.b2_per_count2)};
+  const std::size_t pixels = frames[0].counts.size();
+  rates.rate.resize(pixels);
+  rates.variance.resize(pixels);
+  rates.saturated_count = 0;
+  for (std::size_t begin = 0; begin < pixels; begin += kBlock) {
+    MergeBlock(brackets, noise, begin, std::min(kBlock, pixels - begin), rates);
+  }
+  if (!corrections.hot_pixels.empty()) {
+    FillHotPixels(calibration, rates);
+  }
 }
 
 }  // namespace nacre::reconstruct::internal

@@ -19,8 +19,18 @@ struct RateFrame {
 
 /// Merges exposures of one scene (any order) into rates: the mean weighted by the
 /// inverse variances of the noise model at the rate that all usable exposures agree on,
-/// which is the maximum-likelihood estimate [Hasinoff10].
-RateFrame MergeExposures(std::span<const acquire::Frame> frames,
-                         const calibrate::Calibration& calibration);
+/// which is the maximum-likelihood estimate [Hasinoff10]. Counts are made linear, what
+/// overflowing pixels spoil is left out, hot pixels are the mean of their neighbours.
+/// `rates` is overwritten.
+void MergeExposures(std::span<const acquire::Frame> frames,
+                    const calibrate::Calibration& calibration,
+                    RateFrame& rates);
+
+inline RateFrame MergeExposures(std::span<const acquire::Frame> frames,
+                                const calibrate::Calibration& calibration) {
+  RateFrame rates;
+  MergeExposures(frames, calibration, rates);
+  return rates;
+}
 
 }  // namespace nacre::reconstruct::internal

@@ -15,11 +15,13 @@ using Corners = std::vector<Polygon::Corner>;
 // lattice's upper left corner, +y down.
 Corners CornersAbove(const CellLattice& lattice,
                      const calibrate::CameraGeometry& camera,
+                     const PlaceOnLattice& place,
                      int row) {
   Corners corners;
   corners.reserve(static_cast<std::size_t>(camera.width_px) + 1);
   for (int column = 0; column <= camera.width_px; ++column) {
-    const PointMm p = camera.SampleFromPixel({column - 0.5, row - 0.5});
+    const PointMm seen = camera.SampleFromPixel({column - 0.5, row - 0.5});
+    const PointMm p = place ? place(seen) : seen;
     corners.push_back({(p.x - lattice.corner_mm.x) / lattice.pitch_mm,
                        (lattice.corner_mm.y - p.y) / lattice.pitch_mm});
   }
@@ -123,13 +125,14 @@ PointMm CellLattice::Centre(int column, int row) const {
 
 std::vector<std::vector<PixelPiece>> CutPixels(const CellLattice& lattice,
                                                const calibrate::CameraGeometry& camera,
+                                               const PlaceOnLattice& place,
                                                int thread_count) {
   std::vector<std::vector<PixelPiece>> rows(static_cast<std::size_t>(camera.height_px));
   constexpr std::int64_t kBlock = 16;
   ParallelForBlocks(camera.height_px, kBlock, thread_count, [&](auto begin, auto end) {
-    Corners above = CornersAbove(lattice, camera, static_cast<int>(begin));
+    Corners above = CornersAbove(lattice, camera, place, static_cast<int>(begin));
     for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
-      Corners below = CornersAbove(lattice, camera, row + 1);
+      Corners below = CornersAbove(lattice, camera, place, row + 1);
       CutRow(lattice, above, below, row, rows[static_cast<std::size_t>(row)]);
       above = std::move(below);
     }

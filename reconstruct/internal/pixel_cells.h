@@ -4,6 +4,7 @@
 #include "reconstruct/rd_dataset.h"
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace nacre::reconstruct::internal {
@@ -34,9 +35,13 @@ struct PixelPiece {
   double dv;     ///< down
 };
 
+/// Where a point seen on the sample's surface lies in the lattice; empty: where it is.
+using PlaceOnLattice = std::function<PointMm(PointMm)>;
+
 /// All pieces, sorted by pixel rows. Pixels cover quadrilaterals of the sample plane.
 std::vector<std::vector<PixelPiece>> CutPixels(const CellLattice& lattice,
                                                const calibrate::CameraGeometry& camera,
+                                               const PlaceOnLattice& place,
                                                int thread_count);
 
 }  // namespace nacre::reconstruct::internal

@@ -6,6 +6,8 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 
 namespace nacre::reconstruct::internal {
@@ -39,12 +41,59 @@ std::size_t Stride(int dimensions) {
   return static_cast<std::size_t>((dimensions + kLanes - 1) / kLanes * kLanes);
 }
 
-float Peak(std::span<const float> rd, std::span<const std::uint8_t> valid) {
+// The largest valid value, 0 if there is none above it.
+__attribute__((target_clones("avx512f", "avx2", "default"))) float PeakOf(
+    const float* __restrict rd,
+    const std::uint8_t* __restrict valid,
+    std::size_t size) {
+  float most[kLanes] = {};
+  std::size_t k = 0;
+  for (; k + kLanes <= size; k += kLanes) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const float value = valid[k + lane] != 0 ? rd[k + lane] : 0.0F;
+      most[lane] = most[lane] < value ? value : most[lane];
+    }
+  }
   float peak = 0;
-  for (std::size_t k = 0; k < rd.size(); ++k) {
+  for (; k < size; ++k) {
     peak = valid[k] != 0 ? std::max(peak, rd[k]) : peak;
   }
-  return peak;
+  return std::max(peak, *std::max_element(most, most + kLanes));
+}
+
+float Peak(std::span<const float> rd, std::span<const std::uint8_t> valid) {
+  return PeakOf(rd.data(), valid.data(), rd.size());
+}
+
+// ln x of a positive normal number to 3e-7: x = m 2^e with m around 1, and
+// ln m = 2 artanh((m − 1) / (m + 1)) by its series.
+[[gnu::always_inline]] inline float FastLog(float x) {
+  const auto bits = std::bit_cast<std::int32_t>(x);
+  const std::int32_t exponent = (bits - 0x3F3504F3) >> 23;  // m from 1/√2 to √2
+  const float m = std::bit_cast<float>(bits - (exponent << 23));
+  const float t = (m - 1.0F) / (m + 1.0F);
+  const float t2 = t * t;
+  const float series =
+      2.0F + t2 * (0.66666667F + t2 * (0.4F + t2 * (0.28571429F + t2 * 0.22222222F)));
+  return static_cast<float>(exponent) * 0.69314718F + t * series;
+}
+
+// (ln(R'_d / peak + offset) − mean) · weight of one window; 0 where it isn't valid.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void LogShape(
+    const float* __restrict rd,
+    const std::uint8_t* __restrict valid,
+    const float* __restrict mean_weight,
+    std::array<float, 2> factor_offset,
+    std::span<float> shape) {
+  const std::size_t size = shape.size();
+  const float* __restrict weight = mean_weight + size;
+  float* __restrict out = shape.data();
+  const auto [factor, offset] = factor_offset;
+  for (std::size_t k = 0; k < size; ++k) {
+    const float value = (rd[k] > 0.0F ? rd[k] : 0.0F) * factor + offset;
+    const float one = valid[k] != 0 ? 1.0F : 0.0F;
+    out[k] = one * (FastLog(value) - mean_weight[k]) * weight[k];
+  }
 }
 
 }  // namespace
@@ -65,7 +114,7 @@ SliceFeatures::SliceFeatures(const RdHeader& header,
   std::vector<double> count(size, 0.0);
   std::vector<float> shape(size);
   for (const RdSlice& slice : sample) {
-    Shape(slice, shape);
+    Shape(ViewOf(slice), shape);
     for (std::size_t k = 0; k < size; ++k) {
       const auto value = static_cast<double>(shape[k]);
       const double one = slice.valid[k] != 0 ? 1.0 : 0.0;
@@ -97,18 +146,21 @@ SliceFeatures::SliceFeatures(const RdHeader& header,
   FindComponents(sample, dimensions);
 }
 
-void SliceFeatures::Shape(const RdSlice& slice, std::span<float> shape) const {
+void SliceFeatures::Shape(const SliceView& slice, std::span<float> shape) const {
+  std::vector<float> mean_weight(2 * window_);
   for (std::size_t begin = 0; begin < shape.size(); begin += window_) {
-    const float peak = Peak(std::span(slice.rd).subspan(begin, window_),
-                            std::span(slice.valid).subspan(begin, window_));
-    const float factor = peak > 0 ? 1.0F / peak : 0.0F;
-    for (std::size_t k = begin; k < begin + window_; ++k) {
-      shape[k] =
-          slice.valid[k] != 0
-              ? (std::log(std::max(0.0F, slice.rd[k]) * factor + offset_) - mean_[k]) *
-                    weight_[k]
-              : 0.0F;
-    }
+    const auto rd = slice.rd.subspan(begin, window_);
+    const auto valid = slice.valid.subspan(begin, window_);
+    const float peak = Peak(rd, valid);
+    const auto from = static_cast<std::ptrdiff_t>(begin);
+    const auto count = static_cast<std::ptrdiff_t>(window_);
+    std::copy_n(mean_.begin() + from, count, mean_weight.begin());
+    std::copy_n(weight_.begin() + from, count, mean_weight.begin() + count);
+    LogShape(rd.data(),
+             valid.data(),
+             mean_weight.data(),
+             {peak > 0 ? 1.0F / peak : 0.0F, offset_},
+             shape.subspan(begin, window_));
   }
 }
 
@@ -119,7 +171,7 @@ void SliceFeatures::FindComponents(std::span<const RdSlice> sample, int dimensio
   const auto count = std::ssize(sample);
   Eigen::MatrixXf shapes(size, count);
   for (Eigen::Index s = 0; s < count; ++s) {
-    Shape(sample[static_cast<std::size_t>(s)],
+    Shape(ViewOf(sample[static_cast<std::size_t>(s)]),
           {shapes.col(s).data(), static_cast<std::size_t>(size)});
   }
   Eigen::MatrixXf gram = Eigen::MatrixXf::Zero(count, count);
@@ -146,7 +198,7 @@ void SliceFeatures::FindComponents(std::span<const RdSlice> sample, int dimensio
   }
 }
 
-void SliceFeatures::Project(std::span<const RdSlice* const> slices,
+void SliceFeatures::Project(std::span<const SliceView> slices,
                             std::span<float> features) const {
   const std::size_t size = mean_.size();
   const std::size_t stride = Stride(dimensions_);
@@ -156,7 +208,7 @@ void SliceFeatures::Project(std::span<const RdSlice* const> slices,
     const std::size_t count =
         std::min<std::size_t>(kSlicesAtOnce, slices.size() - first);
     for (std::size_t s = 0; s < count; ++s) {
-      Shape(*slices[first + s], std::span(shapes).subspan(s * size, size));
+      Shape(slices[first + s], std::span(shapes).subspan(s * size, size));
     }
     for (std::size_t column = 0; column < stride; column += kLanes) {
       MultiplyColumns(shapes.data(), &components_[column], size, stride, sums.data());

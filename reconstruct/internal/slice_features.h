@@ -8,6 +8,17 @@
 
 namespace nacre::reconstruct::internal {
 
+/// A slice, or where one lies in a dataset.
+struct SliceView {
+  std::span<const float> rd;
+  std::span<const float> sigma;
+  std::span<const std::uint8_t> valid;
+};
+
+inline SliceView ViewOf(const RdSlice& slice) {
+  return {slice.rd, slice.sigma, slice.valid};
+}
+
 /// What a slice looks like, in a few numbers: principal components [Pearson01] of the
 /// noise-weighted ln(R'_d / peak + offset) of all channels.
 ///
@@ -26,10 +37,10 @@ class SliceFeatures {
   int dimensions() const { return dimensions_; }
 
   /// The features of `slices`, row by row; on one thread.
-  void Project(std::span<const RdSlice* const> slices, std::span<float> features) const;
+  void Project(std::span<const SliceView> slices, std::span<float> features) const;
 
  private:
-  void Shape(const RdSlice& slice, std::span<float> shape) const;
+  void Shape(const SliceView& slice, std::span<float> shape) const;
   void FindComponents(std::span<const RdSlice> sample, int dimensions);
 
   std::size_t window_;

@@ -16,7 +16,7 @@ namespace nacre::reconstruct::internal {
 class TailMap {
  public:
   /// Distances at which the falloff is given, in half widths of a window. Linear in
-  /// between, constant outside.
+  /// between, constant outside; 1 at the first, where the window ends.
   static constexpr std::array<double, 5> kNodes = {1.0, 1.4, 2.0, 3.0, 4.5};
   using Falloff = std::array<float, kNodes.size()>;
 

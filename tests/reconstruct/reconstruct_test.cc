@@ -17,7 +17,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <functional>
+#include <malloc.h>
 #include <memory>
 
 namespace nacre::reconstruct {
@@ -178,6 +180,7 @@ TEST_F(ReconstructTest, SigmaIsTheNoise) {
   ReconstructOptions plain;
   plain.sharpen_spot = false;  // its width is measured anew in every session
   plain.subtract_crosstalk = false;
+  plain.state_systematics = false;
   Reconstruct(Session(), shared->calibration, Path("first.rd.exr"), plain);
   Reconstruct(acquire::SessionReader(Path("again")),
               shared->calibration,
@@ -255,6 +258,39 @@ TEST_F(ReconstructTest, BytesDependOnNeitherThreadsNorMemory) {
   }
 }
 
+// A number of kB from /proc/self/status.
+std::size_t StatusKb(const std::string& key) {
+  std::ifstream status("/proc/self/status");
+  std::string line;
+  while (std::getline(status, line)) {
+    if (line.rfind(key + ":", 0) == 0) {
+      return std::stoul(line.substr(key.size() + 1));
+    }
+  }
+  return 0;
+}
+
+TEST_F(ReconstructTest, MemoryStaysUnderTheBoundOnASessionFiveTimesLarger) {
+  double session_bytes = 0;
+  for (const auto& file :
+       std::filesystem::directory_iterator(Path("session") / "frames")) {
+    session_bytes += static_cast<double>(file.file_size());
+  }
+  ReconstructOptions options;
+  options.memory_bytes = session_bytes / 5;
+  options.thread_count = 2;
+  const acquire::SessionReader session = Session();
+  // Once before, for libraries' code and threads, which are not the session's.
+  Reconstruct(session, shared->calibration, Path("m.rd.exr"), options);
+  malloc_trim(0);
+  std::ofstream("/proc/self/clear_refs") << "5";  // the peak begins anew
+  const std::size_t before_kb = StatusKb("VmRSS");
+  Reconstruct(session, shared->calibration, Path("m.rd.exr"), options);
+  const std::size_t peak_kb = StatusKb("VmHWM");
+  ASSERT_GT(before_kb, 0U);
+  EXPECT_LT(1024.0 * static_cast<double>(peak_kb - before_kb), options.memory_bytes);
+}
+
 TEST_F(ReconstructTest, TheCalibrationMustBeOfTheSameRig) {
   calibrate::Calibration other = shared->calibration;
   other.session_rig_hash = "another";
@@ -287,6 +323,95 @@ TEST_F(ReconstructTest, MissingPicturesAreNamed) {
             acquire::SessionReader(cut), shared->calibration, Path("y.rd.exr"), {});
       }),
       HasSubstr("--resume"));
+}
+
+// As long as nothing is lost and nothing read twice: first the pictures of some groups,
+// then all, then the same again, against one run over all.
+TEST_F(ReconstructTest, LaterRunsReadOnlyWhatIsNew) {
+  const std::filesystem::path part = Path("part");
+  std::filesystem::copy(
+      Path("session"), part, std::filesystem::copy_options::recursive);
+  const std::string journal = ReadFile(part / "journal");
+  const acquire::SessionReader whole = Session();
+  // 3 groups and a picture.
+  const std::int64_t lines = whole.schedule().grid_begin() + 3 * 6 + 1;
+  std::size_t end = 0;
+  for (std::int64_t line = 0; line < lines; ++line) {
+    end = journal.find('\n', end) + 1;
+  }
+  WriteFile(part / "journal", std::string_view(journal).substr(0, end));
+  ReconstructOptions options;
+  options.incremental = true;
+  const std::filesystem::path out = Path("inc.rd.exr");
+  ReconstructSummary summary =
+      Reconstruct(acquire::SessionReader(part), shared->calibration, out, options);
+  EXPECT_EQ(summary.frame_count, 18);
+  EXPECT_EQ(summary.groups_missing, summary.group_count - 3);
+  EXPECT_GT(summary.invalid_count, 0);
+
+  WriteFile(part / "journal", journal);
+  summary =
+      Reconstruct(acquire::SessionReader(part), shared->calibration, out, options);
+  EXPECT_EQ(summary.groups_reused, 3);
+  EXPECT_EQ(summary.groups_missing, 0);
+  EXPECT_EQ(summary.frame_count, 6 * (summary.group_count - 3));
+  Reconstruct(
+      acquire::SessionReader(part), shared->calibration, Path("one.rd.exr"), {});
+  EXPECT_TRUE(ReadFile(out) == ReadFile(Path("one.rd.exr")));
+
+  summary =
+      Reconstruct(acquire::SessionReader(part), shared->calibration, out, options);
+  EXPECT_EQ(summary.frame_count, 0);
+  EXPECT_TRUE(ReadFile(out) == ReadFile(Path("one.rd.exr")));
+
+  // A work file that was damaged, or of another calibration, costs time and no more.
+  std::string work = ReadFile(Path("inc.rd.exr.work"));
+  work[work.size() / 2] = static_cast<char>(work[work.size() / 2] ^ 1);
+  WriteFile(Path("inc.rd.exr.work"), work);
+  summary =
+      Reconstruct(acquire::SessionReader(part), shared->calibration, out, options);
+  EXPECT_EQ(summary.frame_count, 6);
+  EXPECT_TRUE(ReadFile(out) == ReadFile(Path("one.rd.exr")));
+  calibrate::Calibration other = shared->calibration;
+  other.read_noise_electrons *= 1.01;
+  summary = Reconstruct(acquire::SessionReader(part), other, out, options);
+  EXPECT_EQ(summary.groups_reused, 0);
+}
+
+TEST_F(ReconstructTest, TheLitCellIsFilledFromOutsideAndSaysSo) {
+  ReconstructOptions options;
+  options.specular_radius_cells = 1;
+  const ReconstructSummary summary =
+      Reconstruct(Session(), shared->calibration, Path("f.rd.exr"), options);
+  EXPECT_EQ(summary.invalid_count, 5 * 2 * summary.slice_count);
+  Reconstruct(Session(), shared->calibration, Path("p.rd.exr"), {});
+  RdReader filled(Path("f.rd.exr"));
+  RdReader plain(Path("p.rd.exr"));
+  const RdSlice a = filled.ReadSlice(5, 5);
+  const RdSlice b = plain.ReadSlice(5, 5);
+  constexpr std::size_t kCentre = 40;
+  EXPECT_EQ(a.valid[kCentre], 0);
+  EXPECT_EQ(a.valid[kCentre + 9], 0);
+  EXPECT_GT(a.rd[kCentre], a.rd[kCentre + 1]);
+  EXPECT_GT(a.rd[kCentre + 1], b.rd[kCentre + 2]);
+  EXPECT_EQ(a.rd[kCentre + 2], b.rd[kCentre + 2]);
+}
+
+TEST_F(ReconstructTest, AveragingBothWaysSaysWhatItChanges) {
+  ReconstructOptions options;
+  options.symmetrize = true;
+  options.state_systematics = false;
+  const ReconstructSummary summary =
+      Reconstruct(Session(), shared->calibration, Path("s.rd.exr"), options);
+  EXPECT_GT(summary.symmetrize_change, 0);
+  EXPECT_LT(summary.symmetrize_change, 0.02);
+  RdReader reader(Path("s.rd.exr"));
+  EXPECT_LT(MeasureReciprocity(reader).difference, 1e-5);
+  const ReconstructSummary plain =
+      Reconstruct(Session(), shared->calibration, Path("p.rd.exr"), {});
+  EXPECT_EQ(plain.symmetrize_change, 0);
+  EXPECT_GT(plain.reciprocity.difference, 1e-3);
+  EXPECT_LT(plain.reciprocity.asymmetry, 0.1);
 }
 
 TEST_F(ReconstructTest, StoppingLeavesNothing) {

@@ -1,0 +1,77 @@
+#pragma once
+
+#include "acquire/session.h"
+#include "calibrate/calibration.h"
+#include "calibrate/glare.h"
+#include "calibrate/session_state.h"
+#include "reconstruct/internal/cell_weights.h"
+#include "reconstruct/internal/hdr_merge.h"
+#include "reconstruct/rd_dataset.h"
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace nacre::reconstruct::internal {
+
+/// What the pictures of one group of spots show, on the lattice of cells that all
+/// windows are cut from: R_d as if all light had entered with factor 1 (see
+/// GroupReader::EnterFactor), summed over the group's spots.
+struct GroupPicture {
+  std::vector<float> rd;     ///< [channel][cell]
+  std::vector<float> sigma;  ///< of noise; below 0 where it isn't measured
+  std::int64_t frame_count = 0;
+  std::int64_t saturated_count = 0;
+};
+
+/// Pictures of groups to R_d on the lattice. Reading is const and may be done from
+/// several threads.
+class GroupReader {
+ public:
+  /// All arguments must outlive this. `state`: of the session; its plane is that of
+  /// `calibration.camera` already.
+  GroupReader(const acquire::SessionReader& session,
+              const calibrate::Calibration& calibration,
+              const calibrate::SessionState& state,
+              const RdHeader& header,
+              double spot_sigma_mm,
+              int thread_count);
+
+  const CellLattice& lattice() const { return weights_.lattice(); }
+
+  /// Whether all of the group's pictures were taken, or left out on purpose.
+  bool IsThere(int group) const;
+  /// A hash of the pictures that Read() would read.
+  std::uint64_t StateOf(int group) const;
+
+  GroupPicture Read(int group) const;
+
+  /// R_d of light that entered at grid point (i, j) of that group is this factor times
+  /// the lattice's. The laser's power when the pictures were taken is in it.
+  double EnterFactor(int group, int channel, int i, int j) const;
+
+  std::size_t SharedBytes() const { return weights_.MemoryBytes(); }
+  /// Memory that one call of Read() needs, and what its result holds.
+  std::size_t WorkingBytes() const;
+  std::size_t ResultBytes() const;
+
+ private:
+  const std::vector<std::int64_t>& Pictures(int group, int channel) const;
+  void Correct(RateFrame& rates) const;
+
+  const acquire::SessionReader& session_;
+  const calibrate::Calibration& calibration_;
+  const calibrate::SessionState& state_;
+  const RdHeader& header_;
+  CellWeights weights_;
+  /// [group · channels + channel]: numbers of the pictures, one an exposure.
+  std::vector<std::vector<std::int64_t>> pictures_;
+  /// R_d of unit rate is exit_factor_[cell] · that of the spot and channel.
+  std::vector<float> exit_factor_;
+  calibrate::GlareFilter glare_;
+  double glare_sigma_ = 0;           // of what is taken away as glare, relative
+  std::vector<float> ambient_;       // counts per µs; empty: none
+  std::vector<float> inverse_flat_;  // empty: 1
+};
+
+}  // namespace nacre::reconstruct::internal

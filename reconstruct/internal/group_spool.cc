@@ -1,0 +1,164 @@
+#include "reconstruct/internal/group_spool.h"
+
+#include "core/error.h"
+#include "core/hash.h"
+
+#include <array>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace nacre::reconstruct::internal {
+namespace {
+
+// The head of the file; a file of another version differs in the first word.
+struct FileHead {
+  std::array<char, 8> magic = {'N', 'A', 'C', 'R', 'E', 'W', 'K', '1'};
+  std::uint64_t key = 0;
+  std::int64_t group_count = 0;
+  std::int64_t value_count = 0;
+  friend bool operator==(const FileHead&, const FileHead&) = default;
+};
+
+void WriteAll(int fd, const void* data, std::size_t count, std::int64_t offset) {
+  const auto* bytes = static_cast<const unsigned char*>(data);
+  while (count > 0) {
+    const ssize_t moved = ::pwrite(fd, bytes, count, offset);
+    if (moved < 0 && errno == EINTR) {
+      continue;
+    }
+    if (moved <= 0) {
+      throw SystemError("cannot write the work file of a reconstruction");
+    }
+    bytes += moved;
+    count -= static_cast<std::size_t>(moved);
+    offset += moved;
+  }
+}
+
+int OpenFile(const std::filesystem::path& path, bool is_named) {
+  if (is_named) {
+    return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  }
+  std::string pattern = (path.parent_path() / ".nacre-groups-XXXXXX").string();
+  const int fd = ::mkostemp(pattern.data(), O_CLOEXEC);
+  if (fd >= 0) {
+    ::unlink(pattern.c_str());
+  }
+  return fd;
+}
+
+}  // namespace
+
+struct GroupSpool::SlotHead {
+  std::uint64_t state = 0;    // of the pictures it was made of
+  std::uint64_t payload = 0;  // hash of the values; 0: none yet
+  std::int64_t frame_count = 0;
+  std::int64_t saturated_count = 0;
+};
+
+GroupSpool::GroupSpool(const std::filesystem::path& path,
+                       bool is_named,
+                       const Shape& shape)
+    : shape_(shape), held_(static_cast<std::size_t>(shape.group_count), false) {
+  fd_ = OpenFile(path, is_named);
+  if (fd_ < 0) {
+    throw SystemError("cannot make the work file " + path.string());
+  }
+  const FileHead wanted{.key = shape.key,
+                        .group_count = shape.group_count,
+                        .value_count = shape.value_count};
+  FileHead found{};
+  struct stat status {};
+  const std::int64_t size = Offset(static_cast<int>(shape.group_count));
+  const bool goes_on = ::pread(fd_, &found, sizeof found, 0) == sizeof found &&
+                       found == wanted && ::fstat(fd_, &status) == 0 &&
+                       status.st_size == size;
+  if (!goes_on) {
+    if (::ftruncate(fd_, 0) != 0 || ::ftruncate(fd_, size) != 0) {
+      throw SystemError("cannot make the work file " + path.string());
+    }
+    WriteAll(fd_, &wanted, sizeof wanted, 0);
+  }
+  void* data =
+      ::mmap(nullptr, static_cast<std::size_t>(size), PROT_READ, MAP_SHARED, fd_, 0);
+  if (data == MAP_FAILED) {
+    throw SystemError("cannot map the work file " + path.string());
+  }
+  mapped_ = static_cast<const unsigned char*>(data);
+}
+
+GroupSpool::~GroupSpool() {
+  if (mapped_ != nullptr) {
+    ::munmap(const_cast<unsigned char*>(mapped_),
+             static_cast<std::size_t>(Offset(static_cast<int>(shape_.group_count))));
+  }
+  if (fd_ >= 0) {
+    ::close(fd_);
+  }
+}
+
+std::int64_t GroupSpool::SlotBytes() const {
+  return static_cast<std::int64_t>(sizeof(SlotHead)) +
+         2 * shape_.value_count * static_cast<std::int64_t>(sizeof(float));
+}
+
+std::int64_t GroupSpool::Offset(int g) const {
+  return static_cast<std::int64_t>(sizeof(FileHead)) + g * SlotBytes();
+}
+
+const GroupSpool::SlotHead& GroupSpool::Head(int g) const {
+  return *static_cast<const SlotHead*>(static_cast<const void*>(mapped_ + Offset(g)));
+}
+
+std::span<const float> GroupSpool::Rd(int g) const {
+  return {static_cast<const float*>(
+              static_cast<const void*>(mapped_ + Offset(g) + sizeof(SlotHead))),
+          static_cast<std::size_t>(shape_.value_count)};
+}
+
+std::span<const float> GroupSpool::Sigma(int g) const {
+  return {Rd(g).data() + shape_.value_count,
+          static_cast<std::size_t>(shape_.value_count)};
+}
+
+std::int64_t GroupSpool::FrameCount(int g) const {
+  return Head(g).frame_count;
+}
+
+std::int64_t GroupSpool::SaturatedCount(int g) const {
+  return Head(g).saturated_count;
+}
+
+bool GroupSpool::TakeUp(int g, std::uint64_t state) {
+  const SlotHead& head = Head(g);
+  const std::size_t bytes =
+      2 * static_cast<std::size_t>(shape_.value_count) * sizeof(float);
+  const bool whole = head.payload != 0 && head.state == state &&
+                     head.payload == Hash64(Rd(g).data(), bytes);
+  held_[static_cast<std::size_t>(g)] = whole;
+  return whole;
+}
+
+void GroupSpool::Park(int g, std::uint64_t state, const GroupPicture& picture) {
+  Expect(std::ssize(picture.rd) == shape_.value_count &&
+             std::ssize(picture.sigma) == shape_.value_count,
+         "a picture of the spool's shape");
+  const std::size_t bytes = picture.rd.size() * sizeof(float);
+  std::int64_t offset = Offset(g) + static_cast<std::int64_t>(sizeof(SlotHead));
+  WriteAll(fd_, picture.rd.data(), bytes, offset);
+  offset += static_cast<std::int64_t>(bytes);
+  WriteAll(fd_, picture.sigma.data(), bytes, offset);
+  const SlotHead head{.state = state,
+                      .payload = Hash64(Rd(g).data(), 2 * bytes),
+                      .frame_count = picture.frame_count,
+                      .saturated_count = picture.saturated_count};
+  WriteAll(fd_, &head, sizeof head, Offset(g));
+  held_[static_cast<std::size_t>(g)] = true;
+}
+
+}  // namespace nacre::reconstruct::internal

@@ -1,0 +1,53 @@
+#pragma once
+
+#include "reconstruct/internal/group_reader.h"
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+namespace nacre::reconstruct::internal {
+
+/// The groups' pictures on the lattice, kept in a file until the slices are cut from
+/// them. A file with a name outlives this and is taken up again by the next run, for
+/// the groups whose pictures are still the same; without one a crash leaves nothing.
+class GroupSpool {
+ public:
+  struct Shape {
+    std::uint64_t key = 0;  ///< of all that the pictures' values depend on
+    std::int64_t group_count = 0;
+    std::int64_t value_count = 0;  ///< of one group, channels · cells
+  };
+
+  /// `path`: of the file; `is_named` or else only to be in that folder. A file of
+  /// another key or shape is begun anew.
+  GroupSpool(const std::filesystem::path& path, bool is_named, const Shape& shape);
+  ~GroupSpool();
+  GroupSpool(const GroupSpool&) = delete;
+  GroupSpool& operator=(const GroupSpool&) = delete;
+
+  /// Takes up group `g` of an earlier run, if it is there, made of pictures of that
+  /// state, and whole.
+  bool TakeUp(int g, std::uint64_t state);
+  void Park(int g, std::uint64_t state, const GroupPicture& picture);
+
+  bool Holds(int g) const { return held_[static_cast<std::size_t>(g)]; }
+  /// [channel][cell], as in GroupPicture; of a group that is held.
+  std::span<const float> Rd(int g) const;
+  std::span<const float> Sigma(int g) const;
+  std::int64_t FrameCount(int g) const;
+  std::int64_t SaturatedCount(int g) const;
+
+ private:
+  struct SlotHead;
+  const SlotHead& Head(int g) const;
+  std::int64_t SlotBytes() const;
+  std::int64_t Offset(int g) const;
+
+  Shape shape_;
+  std::vector<bool> held_;
+  int fd_ = -1;
+  const unsigned char* mapped_ = nullptr;
+};
+
+}  // namespace nacre::reconstruct::internal
