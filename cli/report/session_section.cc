@@ -202,7 +202,9 @@ std::string SessionSection(const std::filesystem::path& folder) {
 }
 
 std::string CalibrationSection(const std::filesystem::path& path) {
-  return Section("Calibration", path.filename().string(), CalibrationBody(path) + CalibrationFigures(path));
+  return Section("Calibration",
+                 path.filename().string(),
+                 CalibrationBody(path) + CalibrationFigures(path));
 }
 
 }  // namespace nacre::cli::report
