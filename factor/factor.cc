@@ -101,6 +101,8 @@ const std::vector<std::pair<std::string, MakeMethod>>& Methods() {
   static const std::vector<std::pair<std::string, MakeMethod>> methods{
       {"log-svd", internal::MakeSvdMethod},
       {"svd", internal::MakeSvdMethod},
+      {"sqrt-svd", internal::MakeSvdMethod},
+      {"nmf", internal::MakeNmfMethod},
       {"bilinear", internal::MakeBilinearMethod},
       {"reciprocal", internal::MakeReciprocalMethod}};
   return methods;

@@ -34,7 +34,10 @@ struct FactorOptions {
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
-    visit("method", self.method, Range{}, "log-svd, svd, bilinear or reciprocal");
+    visit("method",
+          self.method,
+          Range{},
+          "log-svd, svd, sqrt-svd, nmf, bilinear or reciprocal");
     visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
     visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
     visit("bytes",
@@ -65,8 +68,8 @@ struct FactorOptions {
     visit("tail_weight",
           self.tail_weight,
           Range{0, 2},
-          "of bilinear, nmf and reciprocal: 0 minimises the error in R_d, 1 that over the "
-          "root of R_d, 2 that over R_d");
+          "of bilinear, nmf and reciprocal: 0 minimises the error in R_d, 1 that over "
+          "the root of R_d, 2 that over R_d");
     visit("taps",
           self.taps,
           Range{1, 4},

@@ -182,7 +182,10 @@ Material ToMaterial(const SvdModel& model,
   const auto points = static_cast<std::size_t>(header.PointCount());
   const auto window = static_cast<std::size_t>(header.WindowSize());
   Material m = EmptyMaterial(header);
-  m.transform = model.transforms[0].is_log ? Transform::kLog : Transform::kLinear;
+  const RowTransform& first = model.transforms[0];
+  m.transform = first.is_log    ? Transform::kLog
+                : first.is_root ? Transform::kSqrt
+                                : Transform::kLinear;
   m.terms = terms;
   m.cluster_count = model.cluster_count;
   m.cluster = model.cluster;
@@ -197,8 +200,10 @@ Material ToMaterial(const SvdModel& model,
     }
     for (std::size_t k = 0; k < clusters; ++k) {
       const RowBasis& basis = model.bases[c * clusters + k];
-      const double scale = (transform.is_log ? 1 : transform.a) /
-                           std::sqrt(static_cast<double>(basis.rows));
+      const double unit = transform.is_log    ? 1
+                          : transform.is_root ? std::sqrt(transform.a)
+                                              : transform.a;
+      const double scale = unit / std::sqrt(static_cast<double>(basis.rows));
       for (Eigen::Index j = 0; j < std::min<Eigen::Index>(terms, basis.rank()); ++j) {
         const std::size_t at = ((c * clusters + k) * static_cast<std::size_t>(terms) +
                                 static_cast<std::size_t>(j)) *

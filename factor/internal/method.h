@@ -53,6 +53,7 @@ class Method {
 /// The job must outlive the method.
 std::unique_ptr<Method> MakeSvdMethod(Job& job);
 std::unique_ptr<Method> MakeBilinearMethod(Job& job);
+std::unique_ptr<Method> MakeNmfMethod(Job& job);
 std::unique_ptr<Method> MakeReciprocalMethod(Job& job);
 
 /// Header fields, and row_scale and albedo of the right size.

@@ -13,6 +13,16 @@
 #include <cmath>
 #include <limits>
 
+#ifndef NACRE_FACTOR_ROW_SCALING_
+#define NACRE_FACTOR_ROW_SCALING_
+namespace nacre::factor::internal {
+struct Scaling {
+  bool is_log, is_root;
+  float scale, shift;
+};
+}  // namespace nacre::factor::internal
+#endif
+
 HWY_BEFORE_NAMESPACE();
 namespace nacre::factor::internal {
 namespace HWY_NAMESPACE {
@@ -61,8 +71,16 @@ struct Log {
 };
 
 struct Linear {
-  F scale, shift;
+  F scale;
   HWY_ATTR F operator()(F rd) const { return hn::Mul(rd, scale); }
+};
+
+struct Root {
+  F scale;
+  HWY_ATTR F operator()(F rd) const {
+    const F x = hn::Mul(rd, scale);
+    return hn::CopySign(hn::Sqrt(hn::Abs(x)), x);
+  }
 };
 
 template <class Forward>
@@ -92,11 +110,14 @@ HWY_ATTR float Apply(const Forward& forward,
   return sum;
 }
 
-HWY_ATTR float Transform(
-    bool is_log, float scale, float shift, std::span<const float> rd, float* y) {
+HWY_ATTR float Transform(const Scaling& t, std::span<const float> rd, float* y) {
   const auto n = static_cast<std::int64_t>(rd.size());
-  return is_log ? Apply(Log{Set(scale), Set(shift)}, rd.data(), n, y)
-                : Apply(Linear{Set(scale), Set(shift)}, rd.data(), n, y);
+  const F scale = Set(t.scale);
+  if (t.is_log) {
+    return Apply(Log{scale, Set(t.shift)}, rd.data(), n, y);
+  }
+  return t.is_root ? Apply(Root{scale}, rd.data(), n, y)
+                   : Apply(Linear{scale}, rd.data(), n, y);
 }
 
 // A matrix that is walked along `inner`, `outer` being the rows of the product.
@@ -199,9 +220,11 @@ bool FitsFloats(const RowTransform& transform) {
 float TransformFloats(const RowTransform& transform,
                       std::span<const float> rd,
                       float* row) {
-  const auto scale = static_cast<float>(ScaleOf(transform));
-  const auto shift = static_cast<float>(std::log(transform.b));
-  return HWY_DYNAMIC_DISPATCH(Transform)(transform.is_log, scale, shift, rd, row);
+  const Scaling scaling{transform.is_log,
+                        transform.is_root,
+                        static_cast<float>(ScaleOf(transform)),
+                        static_cast<float>(std::log(transform.b))};
+  return HWY_DYNAMIC_DISPATCH(Transform)(scaling, rd, row);
 }
 
 float CopyRow(std::span<const double> values, float* row) {

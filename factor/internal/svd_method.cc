@@ -102,7 +102,9 @@ class SvdMethod final : public Method {
                   const bool is_log = job_.options.method == "log-svd";
                   const double scale = std::max(scan.peak, -scan.least);
                   // A channel of zeros: any A and B give ln B = 0 everywhere.
-                  model_.transforms[c] = {is_log, scale > 0 ? scale : 1, 1};
+                  model_.transforms[c] = {.is_log = is_log,
+                                          .a = scale > 0 ? scale : 1,
+                                          .is_root = job_.options.method == "sqrt-svd"};
                   if (!is_log || !(scale > 0)) {
                     return;
                   }

@@ -129,7 +129,8 @@ TEST(BlockSvd, ErrorIsTheExactOnesToTheTolerance) {
   const double peak = static_cast<double>(Peak(data));
   for (const RowTransform& transform : {RowTransform{true, 0.01 * peak, 1},
                                         RowTransform{true, peak, 0.5},
-                                        RowTransform{false, peak, 1}}) {
+                                        RowTransform{false, peak, 1},
+                                        RowTransform{.a = peak, .is_root = true}}) {
     const Fits fits = FitBoth(data, transform, {.terms = 10});
     ASSERT_EQ(fits.blocks.bases[0].rank(), 10);
     ExpectAsGood(fits, 1e-5);

@@ -115,7 +115,9 @@ TEST_P(FactorStress, NegativeNoiseIsNotClipped) {
     noise += std::pow(static_cast<double>(clean.rd[n] - dataset.rd[n]), 2);
     signal += std::pow(static_cast<double>(dataset.rd[n]), 2);
   }
-  EXPECT_LT(summary.relative_l2, 1.1 * std::sqrt(noise / signal));
+  // The root is steep where noise crosses zero.
+  const double bound = GetParam() == std::string("sqrt-svd") ? 1.15 : 1.1;
+  EXPECT_LT(summary.relative_l2, bound * std::sqrt(noise / signal));
 }
 
 TEST_P(FactorStress, HalvesOfNothingAndOfNegatives) {
@@ -181,7 +183,7 @@ TEST_P(FactorStress, ExactRankIsFoundExactly) {
 INSTANTIATE_TEST_SUITE_P(
     Methods,
     FactorStress,
-    ::testing::Values("log-svd", "svd", "bilinear", "reciprocal"),
+    ::testing::Values("log-svd", "svd", "sqrt-svd", "nmf", "bilinear", "reciprocal"),
     [](const auto& method) {
       std::string name = method.param;
       std::erase(name, '-');

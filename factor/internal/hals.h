@@ -1,0 +1,31 @@
+#pragma once
+
+#include "factor/internal/truncated_svd.h"
+
+#include <cstdint>
+
+namespace nacre::factor::internal {
+
+/// Y ≈ F H with no negative number in either.
+struct Nonnegative {
+  Eigen::MatrixXd f;  ///< rows × terms
+  RowMatrix h;        ///< terms × columns
+};
+
+/// One sweep of hierarchical alternating least squares over the columns of `f`: each in
+/// turn becomes the nonnegative least-squares solution given the others [Cichocki09,
+/// eq. 16], for ‖Y − F H‖² with `gram` = H Hᵀ and `cross` = Y Hᵀ. The error never
+/// rises.
+void HalsSweep(const Eigen::MatrixXd& gram,
+               const Eigen::MatrixXd& cross,
+               Eigen::MatrixXd& f);
+
+/// F and H of at most `terms` terms, the error not falling by 1e-5 a round any more or
+/// after `rounds`. H starts as rows of Y that lie far apart, chosen by `seed`. Negative
+/// entries of Y count, but nothing follows them below zero.
+Nonnegative FactorNonnegative(const RowMatrix& y,
+                              int terms,
+                              int rounds,
+                              std::uint64_t seed);
+
+}  // namespace nacre::factor::internal
