@@ -24,9 +24,8 @@ class ExitanceField final : public ExitanceSource {
                 std::unique_ptr<const Subsurface> subsurface,
                 float spacing_mm);
 
-  Color At(const SurfaceHit& hit, const ExitanceQuery& query) const override {
-    return At(hit, query.counters);
-  }
+  /// At a hit of the shape; what isn't sharp may be a grid's spacing off.
+  Color At(const SurfaceHit& hit, const ExitanceQuery& query) const override;
   Color At(const SurfaceHit& hit, PathCounters& counters) const;
 
   /// Points of the grid; 0 if there is none because it was too large or not wanted.

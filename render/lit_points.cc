@@ -14,9 +14,9 @@ namespace {
 constexpr std::int64_t kBlock = 256;
 
 // Density falls by 4 from level to level.
-constexpr int kLevels = 4;
+constexpr int kLevels = 5;
 // Level 1 starts at twice that many patches from what is seen, level 2 at 4 times, …
-constexpr float kDensePatches = 4;
+constexpr float kDensePatches = 3;
 // A triangle with more points than this has levels of its own for each of them.
 constexpr std::int64_t kLargeTriangle = 64;
 
@@ -155,7 +155,8 @@ LitPoints SampleLitPoints(const World& world,
                             tracer,
                             translucency.model->Eta(),
                             translucency.indirect && options.indirect);
-  // The samples asked for are a patch's; its points share them.
+  // The samples asked for are a patch's; its points share them. Where points are few,
+  // each takes more of them.
   const int samples =
       std::max(1,
                static_cast<int>(std::lround(translucency.irradiance_samples /
@@ -177,8 +178,11 @@ LitPoints SampleLitPoints(const World& world,
           lit.point = ToSurfacePoint(hit, translucency.mm_per_unit);
           lit.area_mm2 =
               static_cast<float>(std::ldexp(area_mm2 / parts, 2 * place.level));
-          lit.flux_density = light.AllLights(
-              hit, samples, MixSeed(seed, static_cast<std::uint64_t>(i)), block);
+          lit.flux_density =
+              light.AllLights(hit,
+                              samples << place.level,
+                              MixSeed(seed, static_cast<std::uint64_t>(i)),
+                              block);
         }
       });
   for (const PathCounters& block : counters) {

@@ -34,8 +34,8 @@ struct LitPoints {
 ///
 /// Clusters of patches are gathered as one when they are small for their distance, so
 /// that at distance D of all that is seen the density may fall like D⁻², without the
-/// points of a cluster becoming fewer: it falls by powers of 4, from 8 patches on, down
-/// to 1/64.
+/// points of a cluster becoming fewer: it falls by powers of 4, from 6 patches on, down
+/// to 4⁻⁴.
 LitPoints SampleLitPoints(const World& world,
                           std::uint32_t shape_index,
                           const PathTracer& tracer,

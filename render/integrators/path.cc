@@ -11,6 +11,8 @@ namespace {
 
 // What a lobe of less than a tenth of a steradian shows can be made out.
 constexpr float kSharpPdf = 10;
+// What is dimmed to less than this needn't be right to a percent.
+constexpr float kSharpThroughput = 0.15F;
 
 float PowerHeuristic(float pdf, float other) {
   const float a = pdf * pdf;
@@ -181,7 +183,8 @@ bool PathTracer::Continue(State& state,
     state.throughput *= 1 / survive;
   }
   state.delta = sample.delta;
-  state.sharp = state.sharp && (sample.delta || sample.pdf > kSharpPdf);
+  state.sharp = state.sharp && (sample.delta || sample.pdf > kSharpPdf) &&
+                MaxComponent(state.throughput) > kSharpThroughput;
   state.pdf = sample.pdf;
   state.origin = hit.position;
   state.side = wo.z > 0 ? hit.normal : -hit.normal;
