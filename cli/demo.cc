@@ -22,7 +22,7 @@ struct Arguments {
   bool quick = false;
   int size = 512;
   int spp = 32;
-  int terms = 10;
+  int terms = 3;
 };
 
 double Number(const Json& json, const char* key) {
@@ -127,7 +127,7 @@ void RunLine(Line& line, const Arguments& args) {
            {"factor",
             sample,
             "--method",
-            "log-svd",
+            "reciprocal",
             "--terms",
             std::to_string(args.terms),
             "--out",
@@ -218,7 +218,7 @@ std::function<int()> MakeDemoVerb(CLI::App& app, const Common& common) {
   app.add_option("--spp", args->spp, "samples a pixel")
       ->capture_default_str()
       ->check(CLI::Range(1, 65536));
-  app.add_option("--terms", args->terms, "terms S of the factorization")
+  app.add_option("--terms", args->terms, "terms of the factorization")
       ->capture_default_str()
       ->check(CLI::Range(1, 64));
   return [args, &common] { return Run(*args, common); };
