@@ -122,6 +122,26 @@ std::uint64_t GroupReader::StateOf(int group) const {
   return Hash64(hashes.data(), hashes.size());
 }
 
+std::vector<bool> GroupReader::LitPoints() const {
+  const acquire::GridDescription& grid = session_.rig().grid;
+  std::vector<bool> lit(static_cast<std::size_t>(grid.PointCount()), false);
+  const auto at = [&](const acquire::GridIndex& point) {
+    return static_cast<std::size_t>(std::int64_t{point.j} * grid.points_x + point.i);
+  };
+  for (int group = 0; group < session_.schedule().group_count(); ++group) {
+    for (const acquire::GridIndex& point : session_.schedule().Group(group)) {
+      lit[at(point)] = true;
+    }
+  }
+  if (session_.manifest().adaptive_plan) {
+    for (const acquire::GridIndex& point :
+         session_.manifest().adaptive_plan->empty_points) {
+      lit[at(point)] = false;
+    }
+  }
+  return lit;
+}
+
 double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
   double flux = 0;
   double count = 0;

@@ -50,6 +50,10 @@ class GroupReader {
   /// the lattice's. The laser's power when the pictures were taken is in it.
   double EnterFactor(int group, int channel, int i, int j) const;
 
+  /// A grid point at a time, row by row: whether the laser went there. The rig's
+  /// outline and an adaptive capture leave points out.
+  std::vector<bool> LitPoints() const;
+
   std::size_t SharedBytes() const { return weights_.MemoryBytes(); }
   /// Memory that one call of Read() needs, and what its result holds.
   std::size_t WorkingBytes() const;

@@ -65,6 +65,7 @@ Separation::Separation(const RdHeader& header,
       channels_(static_cast<int>(header.channels.size())),
       thread_count_(thread_count),
       group_of_(GroupsOf(header, schedule)),
+      lit_(reader.LitPoints()),
       tails_(header),
       spread_(header.channels.size(), kFirstSpread) {
   const int spacing = SpacingOf(header, schedule);
@@ -169,7 +170,8 @@ Separation::Value Separation::ValueOf(
 }
 
 Separation::Value Separation::At(std::int64_t s, int channel, int u, int v) const {
-  if (!spool_.Holds(group_of_[static_cast<std::size_t>(s)])) {
+  const auto slot = static_cast<std::size_t>(s);
+  if (!lit_[slot] || !spool_.Holds(group_of_[slot])) {
     return {};
   }
   if (!has_tails_) {
@@ -190,7 +192,8 @@ Separation::Value Separation::At(std::int64_t s, int channel, int u, int v) cons
 
 RdSlice Separation::Slice(std::int64_t s, double* share) const {
   RdSlice slice = MakeSlice(header_);
-  if (!spool_.Holds(group_of_[static_cast<std::size_t>(s)])) {
+  const auto slot = static_cast<std::size_t>(s);
+  if (!lit_[slot] || !spool_.Holds(group_of_[slot])) {
     std::fill(slice.valid.begin(), slice.valid.end(), std::uint8_t{0});
     return slice;
   }

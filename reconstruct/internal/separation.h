@@ -83,6 +83,7 @@ class Separation {
   bool is_dense_;
   double spacing_;                   // of spots, in half widths of a window
   std::vector<int> group_of_;        // by slice
+  std::vector<bool> lit_;            // by slice
   std::vector<float> enter_factor_;  // [slice][channel]
   bool has_tails_ = false;
   TailMap tails_;
