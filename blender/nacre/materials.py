@@ -195,24 +195,14 @@ def measured_file(settings):
     return os.path.join(preset["folder"], preset["files"]["material"])
 
 
-def _medium(settings):
-    # Mitsuba's names; its coefficients are per scene unit, with `scale` on top.
-    return xml.element("medium", [
-        xml.rgb("sigmaS", settings.sigma_s), xml.rgb("sigmaA", settings.sigma_a),
-        xml.number("scale", settings.mm_per_unit),
-        xml.element("phase", [xml.number("g", settings.anisotropy)], type="hg"),
-    ], type="homogeneous", name="interior")
-
-
 def _translucent(material):
     settings = material.nacre
     if settings.model == "MEDIUM":
-        glass = xml.element("bsdf", [
-            xml.number("intIOR", settings.ior), xml.number("extIOR", 1)], type="dielectric")
-        return [glass, _medium(settings)]
+        log.warn("%s: the renderer has no participating media yet: the dipole is used"
+                 % material.name)
     coat = _coat(xml.rgb("diffuseReflectance", (0, 0, 0)), settings.roughness, settings.ior)
     scale = xml.number("scale", settings.mm_per_unit)
-    if settings.model == "DIPOLE":
+    if settings.model in ("DIPOLE", "MEDIUM"):
         model = xml.element("subsurface", [
             xml.rgb("sigmaS", settings.sigma_s), xml.rgb("sigmaA", settings.sigma_a),
             xml.number("g", settings.anisotropy), xml.number("intIOR", settings.ior),

@@ -39,8 +39,7 @@ class NACRE_PT_material(NacrePanel, bpy.types.Panel):
             layout.prop(settings, "anisotropy")
             layout.prop(settings, "ior")
         layout.prop(settings, "mm_per_unit")
-        if settings.model != "MEDIUM":
-            layout.prop(settings, "roughness")
+        layout.prop(settings, "roughness")
         if settings.model == "SVD":
             layout.operator("nacre.add_cycles_material")
 

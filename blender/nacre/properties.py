@@ -6,7 +6,7 @@ from . import presets
 
 MODELS = (
     ("OPAQUE", "None", "Not translucent: the material's own shader, translated"),
-    ("MEDIUM", "Participating media", "Path tracing inside a homogeneous medium"),
+    ("MEDIUM", "Participating media", "A homogeneous medium; drawn by the dipole so far"),
     ("DIPOLE", "Dipole", "The dipole model of a homogeneous medium"),
     ("SVD", "Measured (svd)", "A factored, measured material: a preset or a file"),
 )

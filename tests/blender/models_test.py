@@ -1,0 +1,59 @@
+"""The three models of translucency, and an opaque material, all from Blender's own scene."""
+
+import bpy
+import numpy as np
+import support
+from support import check
+
+support.install()
+support.empty_scene()
+support.add_camera((0, -6, 1), (0, 0, 0), 25)
+support.add_lamp("SUN", (-4, -2, 3), (0, 0, 0), 3.0)
+ball = support.add_ball(None)
+
+
+def picture(material):
+    ball.data.materials.clear()
+    ball.data.materials.append(material)
+    result = support.render(material.name)
+    check(np.isfinite(result).all(), material.name + ": every pixel is a number")
+    # The ball covers a third of the picture; lit from the left, above.
+    left, right = result[:, :24].mean(), result[:, 24:].mean()
+    check(left > 1.5 * right, material.name + ": the lit side is the bright one (%.3f, %.3f)"
+          % (left, right))
+    return result
+
+
+plain = bpy.data.materials.new("opaque")
+plain.use_nodes = True
+pictures = {"OPAQUE": picture(plain)}
+for model in ("DIPOLE", "SVD", "MEDIUM"):
+    material = support.translucent(model)
+    if model == "SVD":
+        material.nacre.preset = "SVD_S10_Chess8x8"
+    pictures[model] = picture(material)
+from nacre import log  # noqa: E402
+
+check(any("participating media" in text for text in log.warnings()), "media: the dipole, said so")
+check(np.array_equal(pictures["MEDIUM"], pictures["DIPOLE"]), "and it is the dipole's picture")
+for model in ("DIPOLE", "SVD"):
+    check(support.relative_l2(pictures[model], pictures["OPAQUE"]) > 0.05,
+          model + " isn't the opaque picture")
+
+# Light goes on into the shadow, the farther the less absorbing the medium is.
+marble = support.translucent("DIPOLE", mm_per_unit=4.0)
+clear = picture(marble)
+shadow = np.s_[14:30, 33:37]
+check(clear[shadow].mean() > 1.3 * pictures["DIPOLE"][shadow].mean(),
+      "a smaller ball lets more light into its shadow (%.4f against %.4f)"
+      % (clear[shadow].mean(), pictures["DIPOLE"][shadow].mean()))
+
+# A file instead of a preset is the same material.
+measured = support.translucent("SVD")
+measured.nacre.source = "FILE"
+from nacre import presets  # noqa: E402
+
+preset = presets.all_presets()["SVD_S10_Chess8x8"]
+measured.nacre.file = preset["folder"] + "/" + preset["files"]["material"]
+check(np.array_equal(picture(measured), pictures["SVD"]), "a file is what its preset is")
+support.done()
