@@ -146,6 +146,17 @@ void WarnOfLaser(const Calibration& calibration,
     const double half = std::hypot(0.5 * (s.xx_mm2 - s.yy_mm2), s.xy_mm2);
     const double longer = std::sqrt(std::max(0.0, mean + half));
     const double shorter = std::sqrt(std::max(1e-12, mean - half));
+    const CameraGeometry& camera = calibration.camera;
+    const double pixel_mm =
+        std::sqrt(camera.FootprintMm2({0.5 * camera.width_px, 0.5 * camera.height_px}));
+    constexpr double kWidePx = 1.5;
+    list.AddIf(longer > kWidePx * pixel_mm,
+               "blurred-spot",
+               fmt::format("the spot of channel {} has a standard deviation of {:.1f} "
+                           "pixels or more: its skirt passes for glare, and the flux "
+                           "scale may be off by per cents. Is the lens in focus?",
+                           calibration.channels[k].name,
+                           longer / pixel_mm));
     list.AddIf(longer > 1.15 * shorter && half > 4 * s.sigma_mm2,
                "long-spot",
                fmt::format("the spot of channel {} isn't round: {:.3f} by {:.3f} mm "
