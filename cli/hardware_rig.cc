@@ -3,11 +3,15 @@
 #include "acquire/aravis_camera.h"
 #include "acquire/helios_illuminator.h"
 #include "acquire/rig_light.h"
+#include "cli/command_line.h"
 #include "core/error.h"
 
 #include <fmt/format.h>
 #include <iostream>
+#include <poll.h>
 #include <string>
+#include <termios.h>
+#include <unistd.h>
 
 namespace nacre::cli {
 namespace {
@@ -37,17 +41,35 @@ std::string WhatToDo(acquire::Target target, int pose) {
   throw LogicError("a target of no kind");
 }
 
+// Waits for the next line on standard input; false at its end. Unlike std::getline it
+// is ended by Ctrl-C.
+bool AwaitEnter() {
+  constexpr int kPauseMs = 200;
+  for (char c = 0; c != '\n';) {
+    pollfd ready{STDIN_FILENO, POLLIN, 0};
+    const int count = ::poll(&ready, 1, kPauseMs);
+    if (InterruptRequested()) {
+      throw Interrupted("stopped while waiting for Enter; --resume goes on");
+    }
+    if (count == 1 && ::read(STDIN_FILENO, &c, 1) <= 0) {
+      return false;
+    }
+  }
+  return true;
+}
+
 // Asks the person at the rig. The laser is dark meanwhile.
 class AskingStage final : public acquire::SampleStage {
  public:
   void Place(acquire::Target target, int pose) override {
-    std::cerr << fmt::format("place: {} {}: {}, then press Enter\n",
+    ::tcflush(STDIN_FILENO, TCIFLUSH);  // an Enter of before answers nothing
+    std::cerr << (::isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "")  // of progress
+              << fmt::format("place: {} {}: {}, then press Enter\n",
                              acquire::Name(target),
                              pose,
                              WhatToDo(target, pose))
               << std::flush;
-    std::string line;
-    if (!std::getline(std::cin, line)) {
+    if (!AwaitEnter()) {
       throw Interrupted("nobody answers on standard input; --resume goes on");
     }
   }
