@@ -2,6 +2,7 @@
 
 #include "acquire/aravis_options.h"
 #include "acquire/helios_options.h"
+#include "acquire/projector_options.h"
 #include "acquire/scan_map.h"
 #include "core/toml.h"
 
@@ -107,6 +108,7 @@ struct RigDescription {
   ScannerDescription scanner;
   ScheduleDescription schedule;
   std::optional<LightDescription> illuminator;  ///< none: kind "simulated", or no laser
+  std::optional<ProjectorOptions> projector;    ///< instead of a laser
   std::optional<AdaptiveDescription> adaptive;  ///< none: every picture is taken
 
   int ChannelCount() const { return static_cast<int>(scanner.channels.size()); }

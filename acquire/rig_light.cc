@@ -13,24 +13,30 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
+std::vector<double> ReadPower(const TomlTable& table, std::size_t channel_count) {
+  std::vector<double> power = table.Numbers("power", Range{0, 1});
+  if (power.size() == 1) {
+    power.resize(channel_count, power.front());
+  }
+  if (power.size() != channel_count || channel_count > 3) {
+    throw table.At("power",
+                   fmt::format("{} values for {} channels; red, green and blue at most",
+                               power.size(),
+                               channel_count));
+  }
+  return power;
+}
+
 HeliosOptions ReadDevice(const TomlTable& table, std::size_t channel_count) {
   HeliosOptions device;
+  table.Has("kind");  // which is why this is called
   device.name = table.Text("name", "");
   // Below, a frame has too few points to share out; above, no Helios goes.
   device.points_per_s =
       table.Integer("points_per_s", device.points_per_s, Range{1000, 65'535});
   device.settle_us = table.Number("settle_us", device.settle_us, Range{0, 20'000});
   device.max_angle_rad = table.Number("max_angle_deg", Range{0.1, 60}) * kDegree;
-  device.power = table.Numbers("power", Range{0, 1});
-  if (device.power.size() == 1) {
-    device.power.resize(channel_count, device.power.front());
-  }
-  if (device.power.size() != channel_count || channel_count > 3) {
-    throw table.At("power",
-                   fmt::format("{} values for {} channels; red, green and blue at most",
-                               device.power.size(),
-                               channel_count));
-  }
+  device.power = ReadPower(table, channel_count);
   device.reconnect_s =
       table.Number("reconnect_s", device.reconnect_s, Range{0, 86'400});
   table.RejectUnknownKeys();
@@ -113,6 +119,53 @@ void CheckLimits(const TomlTable& table,
   }
 }
 
+std::vector<double> LitExposures(const RigDescription& rig) {
+  std::vector<double> exposures_us = rig.camera.exposures_us;
+  exposures_us.push_back(rig.targets.reference_exposure_us);
+  exposures_us.insert(exposures_us.end(),
+                      rig.targets.glare_exposures_us.begin(),
+                      rig.targets.glare_exposures_us.end());
+  return exposures_us;
+}
+
+// All that are lit, in whole frames of the projector: it dims by switching within each.
+void CheckExposures(const TomlTable& table,
+                    double refresh_hz,
+                    const RigDescription& rig) {
+  for (const double exposure_us : LitExposures(rig)) {
+    const double frames = exposure_us * 1e-6 * refresh_hz;
+    if (frames < 0.999 || std::abs(frames - std::round(frames)) > 1e-3 * frames) {
+      throw table.At("refresh_hz",
+                     fmt::format("an exposure of {} us is {:.3f} frames of the "
+                                 "projector; all that it lights must be whole ones",
+                                 exposure_us,
+                                 frames));
+    }
+  }
+}
+
+ProjectorOptions ReadProjector(const TomlTable& table, const RigDescription& rig) {
+  ProjectorOptions projector;
+  projector.display = table.Integer("display", projector.display, Range{0, 15});
+  projector.max_angle_rad = table.Number("max_angle_deg", Range{0.1, 60}) * kDegree;
+  projector.field_x_rad = ReadField(table, "field_x_deg", projector.max_angle_rad);
+  projector.field_y_rad = ReadField(table, "field_y_deg", projector.max_angle_rad);
+  projector.spot_px = table.Integer("spot_px", projector.spot_px, Range{1, 999});
+  if (projector.spot_px % 2 == 0) {
+    throw table.At("spot_px", "is even; a spot has a pixel in its middle");
+  }
+  projector.power = ReadPower(table, rig.scanner.channels.size());
+  projector.refresh_hz =
+      table.Number("refresh_hz", projector.refresh_hz, Range{10, 1000});
+  projector.settle_ms =
+      table.Number("settle_ms", projector.settle_ms, Range{0, 10'000});
+  table.RejectUnknownKeys();
+  CheckExposures(table, projector.refresh_hz, rig);
+  CheckField(
+      table, Schedule(rig), Reach(projector.field_x_rad), Reach(projector.field_y_rad));
+  return projector;
+}
+
 }  // namespace
 
 void ReadLight(const TomlTable& root, RigDescription& rig) {
@@ -120,6 +173,21 @@ void ReadLight(const TomlTable& root, RigDescription& rig) {
   const std::optional<TomlTable> safety = root.FindTable("safety");
   if (!illuminator && !safety) {
     return;
+  }
+  if (illuminator && illuminator->Has("device")) {
+    const TomlTable device = illuminator->Table("device");
+    const std::string kind = device.Text("kind", "helios");
+    if (kind != "helios" && kind != "projector") {
+      throw device.At("kind", fmt::format("'{}' isn't one of helios, projector", kind));
+    }
+    if (kind == "projector") {
+      if (safety) {
+        throw root.At("safety", "is for lasers; a projector has its field of its own");
+      }
+      illuminator->RejectUnknownKeys();
+      rig.projector = ReadProjector(device, rig);
+      return;
+    }
   }
   if (!illuminator || !safety) {
     throw root.At(illuminator ? "illuminator" : "safety",
@@ -149,12 +217,7 @@ void ReadLight(const TomlTable& root, RigDescription& rig) {
 
 SpotTiming PlanSpots(const RigDescription& rig) {
   Expect(rig.illuminator.has_value(), "a rig with an illuminator");
-  std::vector<double> exposures_us = rig.camera.exposures_us;
-  exposures_us.push_back(rig.targets.reference_exposure_us);
-  exposures_us.insert(exposures_us.end(),
-                      rig.targets.glare_exposures_us.begin(),
-                      rig.targets.glare_exposures_us.end());
-  return PlanSpots(exposures_us,
+  return PlanSpots(LitExposures(rig),
                    MostSpots(Schedule(rig), rig),
                    rig.illuminator->device.settle_us,
                    rig.illuminator->device.points_per_s);

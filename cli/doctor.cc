@@ -106,6 +106,16 @@ std::vector<Finding> CheckDrivers() {
                       State::kNote,
                       "build with NACRE_WITH_HELIOS (needs libusb)"});
 #endif
+#ifdef NACRE_HAS_PROJECTOR
+  findings.push_back(
+      {"drivers", "projectors", "any display, by SDL 2", State::kGood, ""});
+#else
+  findings.push_back({"drivers",
+                      "projectors",
+                      "left out",
+                      State::kNote,
+                      "build with NACRE_WITH_PROJECTOR (needs SDL 2)"});
+#endif
   return findings;
 }
 

@@ -3,6 +3,9 @@
 #include "acquire/aravis_camera.h"
 #include "acquire/helios_illuminator.h"
 #include "acquire/rig_light.h"
+#ifdef NACRE_HAS_PROJECTOR
+#include "acquire/projector_illuminator.h"
+#endif
 #include "cli/command_line.h"
 #include "core/error.h"
 
@@ -75,28 +78,43 @@ class AskingStage final : public acquire::SampleStage {
   }
 };
 
+std::unique_ptr<acquire::Illuminator> OpenLight(const acquire::RigDescription& rig) {
+  if (rig.projector) {
+#ifdef NACRE_HAS_PROJECTOR
+    return std::make_unique<acquire::ProjectorIlluminator>(*rig.projector,
+                                                           rig.scanner.channels);
+#else
+    throw DeviceError(
+        fmt::format("{}: this build has no driver for projectors; configure it with "
+                    "NACRE_WITH_PROJECTOR",
+                    rig.path.string()));
+#endif
+  }
+  auto laser = std::make_unique<acquire::HeliosIlluminator>(rig.illuminator->device,
+                                                            rig.illuminator->safety,
+                                                            acquire::PlanSpots(rig),
+                                                            rig.scanner.channels);
+  laser->Arm();
+  return laser;
+}
+
 class HardwareRig final : public RigDevices {
  public:
   explicit HardwareRig(acquire::RigDescription description)
       : description_(std::move(description)),
         camera_(*description_.camera.device),
-        laser_(description_.illuminator->device,
-               description_.illuminator->safety,
-               acquire::PlanSpots(description_),
-               description_.scanner.channels) {}
-
-  void Arm() { laser_.Arm(); }
+        light_(OpenLight(description_)) {}
 
   const acquire::RigDescription& description() const override { return description_; }
   acquire::Camera& camera() override { return camera_; }
-  acquire::Illuminator& illuminator() override { return laser_; }
+  acquire::Illuminator& illuminator() override { return *light_; }
   acquire::SampleStage& stage() override { return stage_; }
 
  private:
   const acquire::RigDescription description_;
   acquire::AravisCamera camera_;
   AskingStage stage_;
-  acquire::HeliosIlluminator laser_;  // last, so that it is the first to end
+  std::unique_ptr<acquire::Illuminator> light_;  // last, so that it is the first to end
 };
 
 }  // namespace
@@ -104,22 +122,20 @@ class HardwareRig final : public RigDevices {
 std::unique_ptr<RigDevices> OpenHardwareRig(const std::filesystem::path& rig_toml,
                                             bool arm_laser) {
   acquire::RigDescription description = acquire::ReadRig(rig_toml);
-  if (!description.illuminator) {
-    throw BadData(fmt::format(
-        "{}: illuminator: a capture needs [illuminator.device] and [safety]; `nacre "
-        "doctor --camera {}` tries the camera alone",
-        rig_toml.string(),
-        rig_toml.string()));
+  if (!description.illuminator && !description.projector) {
+    throw BadData(
+        fmt::format("{}: illuminator: a capture needs [illuminator.device]; `nacre "
+                    "doctor --camera {}` tries the camera alone",
+                    rig_toml.string(),
+                    rig_toml.string()));
   }
-  if (!arm_laser) {
+  if (description.illuminator && !arm_laser) {
     throw UsageError(fmt::format(
         "{}: a capture with this rig switches a laser on. Once nobody is in "
         "its way and goggles are worn, say so by --arm-laser",
         rig_toml.string()));
   }
-  auto rig = std::make_unique<HardwareRig>(std::move(description));
-  rig->Arm();
-  return rig;
+  return std::make_unique<HardwareRig>(std::move(description));
 }
 
 }  // namespace nacre::cli

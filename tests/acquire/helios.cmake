@@ -21,3 +21,14 @@ if(TARGET nacre_usb_twins)
       nacre::helios nacre::usb_twins
     EMULATED_USB)
 endif()
+if(TARGET nacre_projector AND TARGET nacre_acquire AND NACRE_WITH_ARAVIS)
+  nacre_test(projector
+    SOURCES
+      projector_test.cc
+    LIBRARIES
+      nacre::projector nacre::acquire)
+  # Not its target: its flags would keep the headers that tests share from being used.
+  target_include_directories(projector_tests SYSTEM PRIVATE ${sdl2_INCLUDE_DIRS})
+  target_compile_definitions(projector_tests PRIVATE
+    NACRE_RIGS_FOLDER="${PROJECT_SOURCE_DIR}/rigs")
+endif()

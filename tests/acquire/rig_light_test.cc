@@ -52,6 +52,7 @@ TEST(RigLight, EachErrorNamesItsLine) {
   EXPECT_THAT(Message("80000, 20000]", "80000, 2000]"), HasSubstr("2000 us in common"));
   EXPECT_THAT(Message("\n[safety]", "\n[safely]"), HasSubstr("there is no [safety]"));
   EXPECT_THAT(Message("settle_us = 300", "setle_us = 300"), HasSubstr("setle_us"));
+  EXPECT_EQ(Message("settle_us = 300", "kind = \"helios\""), "no error");
 }
 
 }  // namespace

@@ -281,5 +281,27 @@ TEST_F(HardwareRigTest, WhoeverDoesntAnswerLeavesASessionThatGoesOn) {
   ask_once([](Process& capture) { capture.Signal(SIGINT); });
 }
 
+#ifdef NACRE_HAS_PROJECTOR
+TEST_F(HardwareRigTest, AProjectorNeedsNoArming) {
+  setenv("SDL_VIDEODRIVER", "dummy", 1);
+  std::string text = ReadFile(rig_toml());
+  const std::size_t at = text.find("[illuminator.device]");
+  text.replace(at,
+               text.find("[targets]") - at,
+               "[illuminator.device]\nkind = \"projector\"\ndisplay = 0\n"
+               "max_angle_deg = 17\nfield_x_deg = [-5, 5]\nfield_y_deg = [-5, 5]\n"
+               "power = 1\nrefresh_hz = 50\n\n");
+  WriteFile(rig_toml(), text);
+  Process capture(CaptureArguments());
+  const auto line = capture.Line();
+  ASSERT_TRUE(line && line->starts_with("place: nothing 0")) << line.value_or("");
+  capture.Signal(SIGINT);
+  EXPECT_EQ(capture.Wait(), 75) << capture.all();
+  const acquire::SessionManifest manifest = acquire::ReadManifest(folder_ / "hardware");
+  EXPECT_EQ(manifest.illuminator.model, "video projector");
+  EXPECT_FALSE(rig_->dac().IsShutterOpen());
+}
+#endif
+
 }  // namespace
 }  // namespace nacre::testing
