@@ -133,18 +133,6 @@ void FinishPlanes(const Job& job, double tail_weight, BilinearData& data) {
   }
 }
 
-// Beyond the grid, what its nearest point has.
-void ExtendMaps(const BilinearData& data, Maps& maps) {
-  const int margin = data.margin;
-  for (int y = 0; y < data.height; ++y) {
-    for (int x = 0; x < data.width; ++x) {
-      const int from_x = std::clamp(x, margin, data.width - 1 - margin);
-      const int from_y = std::clamp(y, margin, data.height - 1 - margin);
-      maps.col(y * data.width + x) = maps.col(from_y * data.width + from_x);
-    }
-  }
-}
-
 }  // namespace
 
 double PairBytes(const reconstruct::RdHeader& header) {
@@ -153,7 +141,7 @@ double PairBytes(const reconstruct::RdHeader& header) {
   return 5.0 * width * height * static_cast<double>(header.SliceSize() + 1) / 2;
 }
 
-BilinearData ReadPairs(Job& job, int terms, double tail_weight, Maps& start) {
+BilinearData ReadPairs(Job& job, int terms, double tail_weight, SharedMaps& start) {
   const reconstruct::RdHeader& header = job.source.header();
   BilinearData data;
   data.margin = header.Radius();
@@ -168,8 +156,8 @@ BilinearData ReadPairs(Job& job, int terms, double tail_weight, Maps& start) {
 
   const WeightedRows rows(job, tail_weight);
   const Eigen::MatrixXd basis = SampleBasis(job, rows, terms);
-  start = Maps::Zero(std::max<Eigen::Index>(basis.cols(), 1),
-                     static_cast<Eigen::Index>(data.Plane()));
+  start = SharedMaps::Zero(std::max<Eigen::Index>(basis.cols(), 1),
+                           static_cast<Eigen::Index>(data.Plane()));
   const std::int64_t points = header.PointCount();
   for (std::int64_t first = 0; first < points; first += kBlockRows) {
     Report(job.progress, {"factor", first, points, "pairs"});
@@ -194,7 +182,7 @@ BilinearData ReadPairs(Job& job, int terms, double tail_weight, Maps& start) {
     });
   }
   ++job.passes;
-  ExtendMaps(data, start);
+  ExtendMaps(data.width, data.height, data.margin, start);
   FinishPlanes(job, tail_weight, data);
   return data;
 }

@@ -1,8 +1,7 @@
 #pragma once
 
 #include "factor/internal/method.h"
-
-#include <Eigen/Core>
+#include "factor/internal/shared_maps.h"
 
 #include <vector>
 
@@ -40,9 +39,6 @@ struct BilinearData {
   }
 };
 
-/// Maps of all points, margin included: one row of floats a map, [term][y · width + x].
-using Maps = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
 /// Bytes that ReadPairs will take.
 double PairBytes(const reconstruct::RdHeader& header);
 
@@ -52,6 +48,6 @@ double PairBytes(const reconstruct::RdHeader& header);
 ///
 /// `start` returns maps to begin with: coordinates of the slices in the leading
 /// singular vectors of the sample's, all channels in a row, up to `terms` of them.
-BilinearData ReadPairs(Job& job, int terms, double tail_weight, Maps& start);
+BilinearData ReadPairs(Job& job, int terms, double tail_weight, SharedMaps& start);
 
 }  // namespace nacre::factor::internal

@@ -164,23 +164,6 @@ class RowEquations {
   std::vector<float> targets_;
 };
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyAdd(
-    float* __restrict to, const float* __restrict a, float b, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) {
-    to[i] += a[i] * b;
-  }
-}
-
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddProducts(
-    float* __restrict to,
-    const float* __restrict a,
-    const float* __restrict b,
-    std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) {
-    to[i] += a[i] * b[i];
-  }
-}
-
 void RowEquations::Add(const Look& look) {
   const std::size_t n = look.points;
   weights_.resize(n);
@@ -192,18 +175,18 @@ void RowEquations::Add(const Look& look) {
   std::fill_n(seen_.begin(), terms_ * n, 0.0F);
   for (std::size_t j = 0; j < terms_; ++j) {
     for (std::size_t k = 0; k < terms_; ++k) {
-      MultiplyAdd(&seen_[j * n], look.f[k], look.kernel[j * terms_ + k], n);
+      AddScaled(&seen_[j * n], look.f[k], look.kernel[j * terms_ + k], n);
     }
   }
   std::size_t entry = 0;
   for (std::size_t j = 0; j < terms_; ++j) {
     const float* row = &seen_[j * n];
-    AddProducts(&right[j * width_ + look.x0], row, targets_.data(), n);
+    AddProduct(&right[j * width_ + look.x0], row, targets_.data(), n);
     for (std::size_t i = 0; i < n; ++i) {
       weighted_[i] = weights_[i] * row[i];
     }
     for (std::size_t k = 0; k <= j; ++k) {
-      AddProducts(
+      AddProduct(
           &normal[entry++ * width_ + look.x0], weighted_.data(), &seen_[k * n], n);
     }
   }
@@ -280,11 +263,11 @@ RowEquations EquationsOfRow(const BilinearData& data, const BilinearFit& fit, in
 
 // Least squares for all f at once, the others' being as they were. `variance` is that
 // of a weighted measurement: points that little is known of stay near where they are.
-Maps SolveMaps(const BilinearData& data,
-               const BilinearFit& fit,
-               double variance,
-               int thread_count) {
-  Maps solved(fit.f.rows(), fit.f.cols());
+SharedMaps SolveMaps(const BilinearData& data,
+                     const BilinearFit& fit,
+                     double variance,
+                     int thread_count) {
+  SharedMaps solved(fit.f.rows(), fit.f.cols());
   const Eigen::Index terms = fit.f.rows();
   ParallelFor(data.height, thread_count, [&](std::int64_t y) {
     const RowEquations equations = EquationsOfRow(data, fit, static_cast<int>(y));
@@ -314,7 +297,7 @@ Maps SolveMaps(const BilinearData& data,
 }
 
 // Of the maps' values over the grid.
-Eigen::MatrixXd MeanProducts(const BilinearData& data, const Maps& f) {
+Eigen::MatrixXd MeanProducts(const BilinearData& data, const SharedMaps& f) {
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(f.rows(), f.rows());
   for (int y = data.margin; y < data.height - data.margin; ++y) {
     const Eigen::MatrixXd row =
@@ -327,7 +310,7 @@ Eigen::MatrixXd MeanProducts(const BilinearData& data, const Maps& f) {
 
 // The same span of maps, with mean products that are the identity. A ridge keeps maps
 // that depend on each other from blowing up.
-void Whiten(const BilinearData& data, Maps& f) {
+void Whiten(const BilinearData& data, SharedMaps& f) {
   Eigen::MatrixXd products = MeanProducts(data, f);
   products.diagonal().array() += 1e-10 * products.trace() + 1e-30;
   const Eigen::MatrixXd root = products.llt().matrixL();
@@ -373,7 +356,7 @@ double WeightedSquares(const BilinearData& data) {
 }  // namespace
 
 BilinearFit FitBilinear(const BilinearData& data,
-                        const Maps& start,
+                        const SharedMaps& start,
                         int thread_count,
                         const ProgressFunction& progress) {
   BilinearFit fit{.f = start, .h = {}};
@@ -384,8 +367,8 @@ BilinearFit FitBilinear(const BilinearData& data,
       std::max<std::int64_t>(1, static_cast<std::int64_t>(data.Plane()) / wanted));
   const double per_measurement =
       WeightedSquares(data) / std::max(Measurements(data), 1.0);
-  Maps best = fit.f;
-  Maps goal = fit.f;  // where the last step from `best` led
+  SharedMaps best = fit.f;
+  SharedMaps goal = fit.f;  // where the last step from `best` led
   double least = SolveAllKernels(data, stride, thread_count, fit);
   double gained = 1;
   double step = 1;

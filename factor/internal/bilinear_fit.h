@@ -7,7 +7,7 @@ namespace nacre::factor::internal {
 
 /// The bilinear model while it is being fitted: values ≈ f(x)ᵀ H(d) f(x + d).
 struct BilinearFit {
-  Maps f;                          ///< uncorrelated over the grid, mean square 1
+  SharedMaps f;                    ///< uncorrelated over the grid, mean square 1
   std::vector<Eigen::MatrixXd> h;  ///< [channel · cells + cell], of data.scale
   double residual = 0;             ///< √ of the weighted share of squares left
   int rounds = 0;
@@ -18,7 +18,7 @@ struct BilinearFit {
 /// takes all points at once; with the whitening it is a subspace iteration. The best
 /// round is kept. Terms come in the order of what they contribute, signs canonical.
 BilinearFit FitBilinear(const BilinearData& data,
-                        const Maps& start,
+                        const SharedMaps& start,
                         int thread_count,
                         const ProgressFunction& progress);
 

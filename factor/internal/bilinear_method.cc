@@ -55,7 +55,7 @@ class BilinearMethod final : public Method {
 
  private:
   Job& job_;
-  Maps start_;
+  SharedMaps start_;
   BilinearData data_;
 };
 

@@ -1,17 +1,12 @@
 #pragma once
 
 #include "factor/internal/method.h"
-
-#include <Eigen/Core>
+#include "factor/internal/shared_maps.h"
 
 #include <cstddef>
 #include <vector>
 
 namespace nacre::factor::internal {
-
-/// Maps of all points, margin included: one row of floats a map, [term][y · width + x].
-using SharedMaps =
-    Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// One pair's measurements, in peaks of the channel, and what is known of them: the
 /// variance of their mean, and, once weights are set, its inverse with the model's

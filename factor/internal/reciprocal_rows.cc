@@ -5,23 +5,6 @@
 namespace nacre::factor::internal {
 namespace {
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
-    float* __restrict to, const float* __restrict a, float b, std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) {
-    to[i] += a[i] * b;
-  }
-}
-
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddProduct(
-    float* __restrict to,
-    const float* __restrict a,
-    const float* __restrict b,
-    std::size_t n) {
-  for (std::size_t i = 0; i < n; ++i) {
-    to[i] += a[i] * b[i];
-  }
-}
-
 __attribute__((target_clones("avx512f", "avx2", "default"))) void AddTriple(
     float* __restrict to,
     const float* __restrict a,

@@ -52,18 +52,6 @@ class LogRows {
   std::vector<Cell> cells_;
 };
 
-// Beyond the grid, what its nearest point has.
-void ExtendMaps(const ReciprocalData& data, SharedMaps& maps) {
-  const int margin = data.margin;
-  for (int y = 0; y < data.height; ++y) {
-    for (int x = 0; x < data.width; ++x) {
-      const int from_x = std::clamp(x, margin, data.width - 1 - margin);
-      const int from_y = std::clamp(y, margin, data.height - 1 - margin);
-      maps.col(y * data.width + x) = maps.col(from_y * data.width + from_x);
-    }
-  }
-}
-
 }  // namespace
 
 SharedMaps StartingMaps(Job& job, const ReciprocalData& data, int terms) {
@@ -99,7 +87,7 @@ SharedMaps StartingMaps(Job& job, const ReciprocalData& data, int terms) {
     });
   }
   ++job.passes;
-  ExtendMaps(data, maps);
+  ExtendMaps(data.width, data.height, data.margin, maps);
   return maps;
 }
 

@@ -1,0 +1,34 @@
+#include "factor/internal/shared_maps.h"
+
+#include <algorithm>
+
+namespace nacre::factor::internal {
+
+void ExtendMaps(int width, int height, int margin, SharedMaps& maps) {
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const int from_x = std::clamp(x, margin, width - 1 - margin);
+      const int from_y = std::clamp(y, margin, height - 1 - margin);
+      maps.col(y * width + x) = maps.col(from_y * width + from_x);
+    }
+  }
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
+    float* __restrict to, const float* __restrict a, float b, std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    to[i] += a[i] * b;
+  }
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddProduct(
+    float* __restrict to,
+    const float* __restrict a,
+    const float* __restrict b,
+    std::size_t n) {
+  for (std::size_t i = 0; i < n; ++i) {
+    to[i] += a[i] * b[i];
+  }
+}
+
+}  // namespace nacre::factor::internal
