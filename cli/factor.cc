@@ -22,10 +22,10 @@ std::string Text(const factor::FactorSummary& summary,
                  const std::filesystem::path& out) {
   std::string text = out.string() + ": " + summary.Brief();
   for (std::size_t c = 0; c < summary.a.size(); ++c) {
-    text += fmt::format("\n  {}: A = {:.4g} mm^-2, B = {:.4g}",
-                        material.channels[c],
-                        summary.a[c],
-                        summary.b[c]);
+    text += fmt::format("\n  {}: A = {:.4g} mm^-2", material.channels[c], summary.a[c]);
+    if (c < summary.b.size()) {  // only logarithms with an offset have it
+      text += fmt::format(", B = {:.4g}", summary.b[c]);
+    }
   }
   if (summary.bits < 32) {
     text += fmt::format(

@@ -70,6 +70,28 @@ TEST_F(Line, TenTermsAddLittle) {
       << "the file holds what was fitted";
 }
 
+TEST_F(Line, EveryMethodWritesAndTells) {
+  for (const std::string method :
+       {"svd", "sqrt-svd", "nmf", "bilinear", "reciprocal"}) {
+    const std::string file = File(method + ".nacre.exr");
+    const Json fit = RunJson({"factor",
+                              File("truth.rd.exr"),
+                              "--method",
+                              method,
+                              "--terms",
+                              "2",
+                              "--out",
+                              file});
+    const Json error = RunJson({"compare", file, File("truth.rd.exr")});
+    EXPECT_NEAR(error.at("relative_l2").get<double>(),
+                fit.at("relative_l2").get<double>(),
+                1e-3)
+        << method;
+    EXPECT_LE(error.at("relative_l2").get<double>(), 0.3) << method;
+    EXPECT_EQ(RunJson({"inspect", file}).at("method"), method);
+  }
+}
+
 TEST_F(Line, PsfKeepsEveryBit) {
   RunJson({"export", File("truth.rd.exr"), "--to", "psf", "--out", File("a.psf")});
   RunJson({"import",
