@@ -30,8 +30,8 @@ class Illuminator {
 
   /// Lights these spots with one channel until Blank() or the next call; returns when
   /// they are lit. The mean power of a spot is the same however many there are; their
-  /// order, which is that of their visits, changes no picture. Throws DeviceError outside ± max_angle_rad or if the device
-  /// is gone and doesn't come back.
+  /// order, which is that of their visits, changes no picture. Throws DeviceError
+  /// outside ± max_angle_rad or if the device is gone and doesn't come back.
   virtual void Light(std::span<const ScanAngle> spots, int channel) = 0;
 
   /// No light at all. Never throws: this is what error paths call.
@@ -42,8 +42,8 @@ class Illuminator {
   virtual void AwaitSteady() {}
 
   /// How often the light wasn't as asked for, so far. To be asked for before
-  /// AwaitSteady() and after the exposure: a picture between which it grew must be taken
-  /// again.
+  /// AwaitSteady() and after the exposure: a picture between which it grew must be
+  /// taken again.
   virtual std::int64_t Interruptions() const { return 0; }
 };
 

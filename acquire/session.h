@@ -55,7 +55,8 @@ class SessionReader {
   /// Throws BadData for a folder that is no session, a manifest that doesn't parse, or
   /// a journal with a bad line before a good one. A torn end is ignored: those pictures
   /// weren't taken.
-  explicit SessionReader(std::filesystem::path folder, FrameView view = FrameView::kRaw);
+  explicit SessionReader(std::filesystem::path folder,
+                         FrameView view = FrameView::kRaw);
 
   const std::filesystem::path& folder() const { return folder_; }
   const SessionManifest& manifest() const { return manifest_; }

@@ -83,12 +83,14 @@ Form ParseForm(const AttributeReader& attributes) {
 
 Transform ParseTransform(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("transform");
-  for (const Transform transform : {Transform::kLinear, Transform::kSqrt, Transform::kLog}) {
+  for (const Transform transform :
+       {Transform::kLinear, Transform::kSqrt, Transform::kLog}) {
     if (text == Name(transform)) {
       return transform;
     }
   }
-  throw attributes.At("transform", "is '" + text + "', none of 'linear', 'sqrt' and 'log'");
+  throw attributes.At("transform",
+                      "is '" + text + "', none of 'linear', 'sqrt' and 'log'");
 }
 
 void ReadErrors(const AttributeReader& attributes, Material& m) {

@@ -55,10 +55,10 @@ std::string ArrowMap(const Arrows& arrows, bool y_down, const std::string& unit)
   const Frame frame(arrows);
   constexpr double kTypicalPx = 12;
   const double per_unit = kTypicalPx / frame.typical;
-  std::string svg =
-      fmt::format(R"svg(<svg viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img">)svg",
-                  kSide,
-                  kSide + 26);
+  std::string svg = fmt::format(
+      R"svg(<svg viewBox="0 0 {0} {1}" width="{0}" height="{1}" role="img">)svg",
+      kSide,
+      kSide + 26);
   for (const auto& [x, y, dx, dy] : arrows) {
     const double u = kMargin + (x - frame.low_x) * frame.Scale();
     const double v =

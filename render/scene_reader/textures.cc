@@ -112,8 +112,7 @@ TexturePtr ReadBitmap(Element& element) {
 Bitmap ReadPicture(Element& element) {
   const std::string name = element.String("filename", "");
   if (name.empty()) {
-    element.Fail(
-        fmt::format("{} needs a <string name=\"filename\">", element.type()));
+    element.Fail(fmt::format("{} needs a <string name=\"filename\">", element.type()));
   }
   const std::filesystem::path path = element.document().File(element.node(), name);
   std::string extension = path.extension().string();

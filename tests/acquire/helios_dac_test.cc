@@ -196,6 +196,7 @@ TEST(HeliosIlluminator, ADacThatStaysAwayIsAnErrorAndMayComeBack) {
   EXPECT_NE(twin.Emitting(), nullptr);
 }
 
+// Not a test by itself: the program that the test below starts and kills.
 TEST(LaserWatchdogChild, DISABLED_LightsForEver) {
   acquire::HeliosIlluminator laser = Laser();
   laser.Arm();

@@ -37,7 +37,7 @@ struct SyntheticTruth {
   std::vector<double> flux_scale_counts_mm2_sr_per_us{900, 500};
   double spot_sigma_mm = 0.4;
   std::size_t dropped_spots = 0;  ///< a speck of dirt on the reference target
-  bool no_board = false;     ///< somebody forgot to put it there
+  bool no_board = false;          ///< somebody forgot to put it there
 
   /// A scanner with pincushion, offset, rotation and unequal scales.
   PointMm LaserAt(acquire::ScanAngle angle) const;

@@ -217,7 +217,8 @@ TEST(RenderTest, UnknownIntegratorsAreUsageErrors) {
     ADD_FAILURE() << "accepted";
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kUsage);
-    EXPECT_THAT(e.what(), HasSubstr("there are scene, path, direct, fast and reference"));
+    EXPECT_THAT(e.what(),
+                HasSubstr("there are scene, path, direct, fast and reference"));
   }
 }
 
