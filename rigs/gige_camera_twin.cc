@@ -1,36 +1,30 @@
 #include "rigs/gige_camera_twin.h"
 
 #include "core/error.h"
+#include "rigs/internal/gige_frame.h"
 #include "rigs/internal/gige_registers.h"
+#include "rigs/internal/udp_socket.h"
 
 #include <algorithm>
-#include <arpa/inet.h>
 #include <array>
 #include <atomic>
-#include <cstring>
 #include <deque>
 #include <fmt/format.h>
 #include <mutex>
-#include <netinet/in.h>
 #include <optional>
 #include <poll.h>
 #include <random>
-#include <sys/socket.h>
 #include <thread>
-#include <unistd.h>
 
 namespace nacre::rigs {
 namespace {
 
-using Bytes = std::vector<std::uint8_t>;
 using Clock = std::chrono::steady_clock;
 using namespace internal;
 
 constexpr std::uint16_t kGvcpPort = 3956;
 constexpr std::uint32_t kMemoryBytes = 0x20000;
 constexpr std::uint32_t kDiscoveryBytes = 0xF8;
-// Of IP, UDP and GVSP headers in a stream packet.
-constexpr std::uint32_t kPacketOverhead = 36;
 
 // GVCP commands; each is acknowledged by its number plus one.
 enum Command : std::uint16_t {
@@ -46,80 +40,6 @@ enum Command : std::uint16_t {
 constexpr std::uint16_t kNotImplemented = 0x8001;
 constexpr std::uint16_t kBadAddress = 0x8003;
 constexpr std::uint16_t kAccessDenied = 0x8006;
-
-void Put(Bytes& bytes, std::uint32_t value, int byte_count) {
-  for (int k = byte_count - 1; k >= 0; --k) {
-    bytes.push_back(static_cast<std::uint8_t>(value >> (8 * k)));
-  }
-}
-
-void Append(Bytes& bytes, const std::uint8_t* begin, const std::uint8_t* end) {
-  bytes.reserve(bytes.size() + static_cast<std::size_t>(end - begin));
-  for (const std::uint8_t* byte = begin; byte != end; ++byte) {
-    bytes.push_back(*byte);
-  }
-}
-
-std::uint32_t Take(const std::uint8_t* bytes, int byte_count) {
-  std::uint32_t value = 0;
-  for (int k = 0; k < byte_count; ++k) {
-    value = value << 8 | bytes[k];
-  }
-  return value;
-}
-
-class UdpSocket {
- public:
-  UdpSocket() : fd_(socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0)) {
-    if (fd_ < 0) {
-      throw SystemError("camera twin: a UDP socket");
-    }
-  }
-  ~UdpSocket() { close(fd_); }
-  UdpSocket(const UdpSocket&) = delete;
-  UdpSocket& operator=(const UdpSocket&) = delete;
-
-  int fd() const { return fd_; }
-
-  bool Bind(std::uint32_t address, std::uint16_t port) {
-    sockaddr_in name = Name(address, port);
-    return bind(fd_, reinterpret_cast<const sockaddr*>(&name), sizeof name) == 0;
-  }
-  void ShareAddress() {
-    const int on = 1;
-    setsockopt(fd_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  }
-  // What the network loses is lost, as with any camera.
-  void Send(const Bytes& bytes, const sockaddr_in& to) {
-    (void)!sendto(fd_,
-                  bytes.data(),
-                  bytes.size(),
-                  0,
-                  reinterpret_cast<const sockaddr*>(&to),
-                  sizeof to);
-  }
-  std::size_t Receive(std::array<std::uint8_t, 2048>& bytes, sockaddr_in& from) {
-    socklen_t length = sizeof from;
-    const ssize_t count = recvfrom(fd_,
-                                   bytes.data(),
-                                   bytes.size(),
-                                   0,
-                                   reinterpret_cast<sockaddr*>(&from),
-                                   &length);
-    return count > 0 ? static_cast<std::size_t>(count) : 0;
-  }
-
-  static sockaddr_in Name(std::uint32_t address, std::uint16_t port) {
-    sockaddr_in name{};
-    name.sin_family = AF_INET;
-    name.sin_addr.s_addr = htonl(address);
-    name.sin_port = htons(port);
-    return name;
-  }
-
- private:
-  int fd_;
-};
 
 }  // namespace
 
@@ -189,10 +109,8 @@ struct GigeCameraTwin::Parts {
     taken_by_another = false;
   }
 
-  int BitsPerPixel() const { return static_cast<int>(Get(kPixelFormat) >> 16 & 0xFF); }
   void SetPayload() {
-    Set(kPayload,
-        Get(kWidth) * Get(kHeight) * static_cast<std::uint32_t>(BitsPerPixel()) / 8);
+    Set(kPayload, Get(kWidth) * Get(kHeight) * BitsPerPixel(Get(kPixelFormat)) / 8);
   }
 
   bool IsController(const sockaddr_in& from) const {
@@ -230,7 +148,7 @@ struct GigeCameraTwin::Parts {
   }
 
   void Answer(UdpSocket& from_socket) {
-    std::array<std::uint8_t, 2048> request{};
+    UdpSocket::Buffer request{};
     sockaddr_in from{};
     const std::size_t size = from_socket.Receive(request, from);
     std::unique_lock lock(mutex);
@@ -321,56 +239,24 @@ struct GigeCameraTwin::Parts {
     return picture;
   }
 
+  FrameHeader Header() const {
+    return {.pixel_format = Get(kPixelFormat),
+            .width = Get(kWidth),
+            .height = Get(kHeight),
+            .left = Get(kOffsetX),
+            .top = Get(kOffsetY),
+            .frame_id = frame_id};
+  }
+
   Bytes Image(const std::vector<std::uint16_t>& picture) const {
-    const int bits = BitsPerPixel();
-    const std::uint32_t code = Get(kPixelFormat);
-    const bool is_deep = code == 0x01100007 || code == 0x01100031;
-    const std::uint32_t max = is_deep                       ? 0xFFFF
-                              : bits % 8 == 0 && bits != 16 ? 0xFF
-                                                            : 0xFFF;
-    const int samples = bits == 24 ? 3 : 1;
-    const double exposure_us = Get(kExposure);
-    Bytes image;
-    std::uint32_t even = 0;  // of a pair of 12-bit counts
-    const auto left = static_cast<int>(Get(kOffsetX)) * samples;
-    const auto top = static_cast<int>(Get(kOffsetY));
-    const auto width = static_cast<int>(Get(kWidth)) * samples;
-    for (int y = 0; y < static_cast<int>(Get(kHeight)); ++y) {
-      for (int x = 0; x < width; ++x) {
-        const std::uint32_t count =
-            std::min(max,
-                     picture.empty() ? options.count(x + left, y + top, exposure_us)
-                                     : std::uint32_t{picture[static_cast<std::size_t>(
-                                           (y + top) * options.width + x + left)]});
-        if (bits == 12 && x % 2 == 0) {
-          even = count;
-        } else if (bits == 12) {
-          image.push_back(static_cast<std::uint8_t>(even));
-          image.push_back(static_cast<std::uint8_t>(even >> 8 | (count & 0xF) << 4));
-          image.push_back(static_cast<std::uint8_t>(count >> 4));
-        } else {
-          image.push_back(static_cast<std::uint8_t>(count));
-          if (bits == 16) {
-            image.push_back(static_cast<std::uint8_t>(count >> 8));
-          }
-        }
-      }
+    if (picture.empty()) {
+      const double exposure_us = Get(kExposure);
+      return PackCounts(Header(),
+                        [&](int x, int y) { return options.count(x, y, exposure_us); });
     }
-    return image;
-  }
-
-  Bytes StreamPacket(int type, std::uint32_t number) const {
-    Bytes packet;
-    Put(packet, 0, 2);
-    Put(packet, frame_id, 2);
-    Put(packet, static_cast<std::uint32_t>(type) << 24 | number, 4);
-    return packet;
-  }
-
-  void SendPacket(const Bytes& packet) {
-    stream.Send(packet,
-                UdpSocket::Name(Get(kStreamAddress),
-                                static_cast<std::uint16_t>(Get(kStreamPort))));
+    return PackCounts(Header(), [&](int x, int y) {
+      return std::uint32_t{picture[static_cast<std::size_t>(y * options.width + x)]};
+    });
   }
 
   void SendFrame(CameraFault fault, std::unique_lock<std::mutex>& lock) {
@@ -385,31 +271,16 @@ struct GigeCameraTwin::Parts {
     }
     const auto now_ns =
         static_cast<std::uint64_t>(Clock::now().time_since_epoch().count());
-    std::vector<Bytes> packets{StreamPacket(1, 0)};
-    Put(packets[0], 1, 4);  // an image
-    Put(packets[0], static_cast<std::uint32_t>(now_ns >> 32), 4);
-    Put(packets[0], static_cast<std::uint32_t>(now_ns), 4);
-    for (const std::uint32_t at : {kPixelFormat, kWidth, kHeight, kOffsetX, kOffsetY}) {
-      Put(packets[0], Get(at), 4);
-    }
-    Put(packets[0], 0, 4);  // no padding
-    const std::size_t room = (Get(kPacketSize) & 0xFFFF) - kPacketOverhead;
-    std::uint32_t number = 1;
-    for (std::size_t begin = 0; begin < image.size(); begin += room, ++number) {
-      Bytes& packet = packets.emplace_back(StreamPacket(3, number));
-      Append(packet,
-             image.data() + begin,
-             image.data() + std::min(begin + room, image.size()));
-    }
-    Bytes& trailer = packets.emplace_back(StreamPacket(2, number));
-    Put(trailer, 1, 4);
-    Put(trailer, Get(kHeight), 4);
+    std::vector<Bytes> packets =
+        FramePackets(Header(), image, now_ns, Get(kPacketSize) & 0xFFFF);
     ++frames_sent;
     if (fault == CameraFault::kDropPacket) {
       packets.erase(packets.begin() + static_cast<std::ptrdiff_t>(packets.size() / 2));
     }
+    const sockaddr_in to = UdpSocket::Name(
+        Get(kStreamAddress), static_cast<std::uint16_t>(Get(kStreamPort)));
     for (const Bytes& packet : packets) {
-      SendPacket(packet);
+      stream.Send(packet, to);
     }
   }
 
