@@ -1,5 +1,6 @@
 #include "calibrate/calibrate.h"
 
+#include "calibrate/filter_estimate.h"
 #include "calibrate/geometry.h"
 #include "calibrate/glare_estimate.h"
 #include "calibrate/laser_map.h"
@@ -23,24 +24,37 @@ namespace {
 struct Foundation {
   GeometryResult geometry;
   DarkResult dark;
+  ColourFilters filters;
   double saturation_counts = 0;
   ResponseResult response;
   SmoothField reference_ambient;
   LaserMapResult laser;
 
   RatePictures Pictures() const {
-    RatePictures pictures(dark, response.linearity);
+    RatePictures pictures(dark, response.linearity, filters);
     pictures.SetAmbient(
         reference_ambient, geometry.camera.width_px, geometry.camera.height_px);
     return pictures;
   }
 };
 
+// A pixel with three counts is a mosaic's that was interpolated before we saw it: its
+// noise isn't the sensor's any more.
+void RefuseThreeCounts(const acquire::SessionReader& session) {
+  if (session.manifest().camera.SamplesPerPixel() != 1) {
+    throw BadData(
+        session.folder().string() +
+        ": pictures of three counts a pixel can't be calibrated; capture in a Bayer "
+        "or monochrome pixel format (camera.pixel_format)");
+  }
+}
+
 Foundation EstimateFoundation(const acquire::SessionReader& session,
                               const CalibrateOptions& options,
                               const ProgressFunction& progress) {
   Validate(options);
   Foundation f;
+  RefuseThreeCounts(session);
   f.geometry = EstimateGeometry(session, progress);
   if (!(f.geometry.reprojection_rms_px <= options.max_reprojection_rms_px)) {
     throw BadData(fmt::format(
@@ -52,10 +66,12 @@ Foundation EstimateFoundation(const acquire::SessionReader& session,
         options.max_reprojection_rms_px));
   }
   f.dark = EstimateDarkMaps(session);
+  f.filters = EstimateFilters(session, f.dark);
   // Where the sensor saturates must be known before its curve, its gain after.
   f.saturation_counts = EstimatePhotonTransfer(session, f.dark).saturation_counts;
   f.response = EstimateResponse(session, f.dark, f.saturation_counts);
-  f.reference_ambient = EstimateAmbient(session, f.dark, f.response.linearity, 0);
+  f.reference_ambient =
+      EstimateAmbient(session, f.dark, f.response.linearity, f.filters, 0);
   f.laser = EstimateLaserMap(session, f.geometry.camera, f.Pictures());
   if (!(f.laser.rms_mm <= options.max_laser_map_rms_mm)) {
     throw BadData(fmt::format(
@@ -90,6 +106,7 @@ void StoreSensor(const Foundation& f,
   calibration.read_noise_electrons = transfer.read_noise_electrons;
   calibration.read_noise_sigma_electrons = transfer.read_noise_sigma_electrons;
   calibration.saturation_counts = transfer.saturation_counts;
+  calibration.corrections.filters = f.filters;
   calibration.corrections.linearity = f.response.linearity;
   calibration.corrections.hot_pixels = f.dark.hot_pixels;
   calibration.corrections.dark_spread_counts_per_us = f.dark.spread_counts_per_us;
@@ -162,7 +179,8 @@ Calibration Calibrate(const acquire::SessionReader& session,
                                             transfer.saturation_counts,
                                             transfer.gain_electrons_per_count);
   corrections.flat_field = flat.field;
-  corrections.ambient = EstimateAmbient(session, f.dark, f.response.linearity, 1);
+  corrections.ambient =
+      EstimateAmbient(session, f.dark, f.response.linearity, f.filters, 1);
   RatePictures pictures = f.Pictures();
   const std::vector<acquire::ScanAngle>& lattice = session.schedule().lattice();
   const GlareResult glare =

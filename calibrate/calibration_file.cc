@@ -220,7 +220,8 @@ Calibration ReadCalibration(const std::filesystem::path& path) {
     calibration.corrections = internal::CorrectionsFromJson(
         Get<Json>(json, "corrections", origin),
         origin + ": corrections",
-        std::int64_t{calibration.camera.width_px} * calibration.camera.height_px);
+        std::int64_t{calibration.camera.width_px} * calibration.camera.height_px,
+        calibration.channels.size());
     const Json diagnostics = Get<Json>(json, "diagnostics", origin);
     const std::string where = origin + ": diagnostics";
     calibration.diagnostics = {.corners_px = Rows<4>(diagnostics, "corners_px", where),

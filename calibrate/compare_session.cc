@@ -104,10 +104,11 @@ std::vector<Warning> CompareWithSession(const acquire::SessionReader& session,
   const DarkResult dark = EstimateDarkMaps(session);
   CompareDark(calibration, dark, session.rig().camera.exposures_us.front(), warnings);
   const Corrections& corrections = calibration.corrections;
-  RatePictures pictures(dark, corrections.linearity);
-  pictures.SetAmbient(EstimateAmbient(session, dark, corrections.linearity, 0),
-                      camera.width,
-                      camera.height);
+  RatePictures pictures(dark, corrections.linearity, corrections.filters);
+  pictures.SetAmbient(
+      EstimateAmbient(session, dark, corrections.linearity, corrections.filters, 0),
+      camera.width,
+      camera.height);
   const LaserMapResult laser = EstimateLaserMap(session, calibration.camera, pictures);
   CompareGeometry(calibration, laser, session.rig().grid.pitch_mm, warnings);
   pictures.SetGlare(corrections.glare, camera.width, camera.height);

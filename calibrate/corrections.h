@@ -2,6 +2,7 @@
 
 #include "core/point_mm.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -105,11 +106,22 @@ struct Blooming {
   int side_reach_px = 0;  ///< along rows
 };
 
+/// What the pixels of a colour mosaic see, by colour (red, green, blue): relative to
+/// the colour that sees most of that light.
+struct ColourFilters {
+  std::string mosaic;  ///< as in acquire::CameraInfo; "": monochrome, the rest is void
+  std::array<double, 3> white{1, 1, 1};       ///< of the lamp
+  std::array<double, 3> ambient{1, 1, 1};     ///< of Corrections::ambient
+  std::vector<std::array<double, 3>> lasers;  ///< a channel
+};
+
 /// What every picture of a calibration says beside calibration.h.
 struct Corrections {
+  ColourFilters filters;
   Linearity linearity;
   SmoothField flat_field{.value_if_empty = 1};  ///< relative response; mean 1
-  SmoothField ambient;  ///< of the sample with the laser off, counts per µs
+  SmoothField ambient;  ///< of the sample with the laser off, counts per µs; of a
+                        ///< mosaic, of the colour that sees most of it
   std::vector<HotPixel> hot_pixels;      ///< ascending
   double dark_spread_counts_per_us = 0;  ///< of the other pixels' dark current
   double row_noise_counts = 0;           ///< common to a row, anew in every picture

@@ -2,6 +2,7 @@
 
 #include "calibrate/internal/pictures.h"
 #include "calibrate/internal/smooth_fit.h"
+#include "calibrate/mosaic.h"
 #include "core/error.h"
 
 #include <algorithm>
@@ -158,6 +159,7 @@ DarkResult EstimateDarkMaps(const acquire::SessionReader& session) {
 SmoothField EstimateAmbient(const acquire::SessionReader& session,
                             const DarkResult& dark,
                             const Linearity& linearity,
+                            const ColourFilters& filters,
                             int pose) {
   const std::vector<std::int64_t> numbers =
       internal::PicturesOf(session, Target::kAmbient, -1, pose);
@@ -178,6 +180,7 @@ SmoothField EstimateAmbient(const acquire::SessionReader& session,
       rates[k] += static_cast<float>(linearity.Linear(frame.counts[k] - level) / scale);
     }
   }
+  Balance(filters.mosaic, filters.ambient, width, rates);
   constexpr int kSide = 8;
   constexpr int kDegree = 4;
   const std::vector<internal::Block> blocks = internal::BlockMeans(

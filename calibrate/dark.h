@@ -23,10 +23,12 @@ struct DarkResult {
 DarkResult EstimateDarkMaps(const acquire::SessionReader& session);
 
 /// Smooth ambient light, counts per µs, of the pictures with the laser off: pose 0 the
-/// reference, pose 1 the sample. Empty if there are none, or no light in them.
+/// reference, pose 1 the sample; of a mosaic, of the colour that sees most. Empty if
+/// there are none, or no light in them.
 SmoothField EstimateAmbient(const acquire::SessionReader& session,
                             const DarkResult& dark,
                             const Linearity& linearity,
+                            const ColourFilters& filters,
                             int pose);
 
 }  // namespace nacre::calibrate

@@ -1,5 +1,9 @@
 #include "calibrate/geometry.h"
 
+#include "acquire/mosaic.h"
+#include "calibrate/filter_estimate.h"
+#include "calibrate/internal/pictures.h"
+#include "calibrate/mosaic.h"
 #include "core/error.h"
 
 #include <opencv2/calib3d.hpp>
@@ -17,28 +21,47 @@ namespace {
 
 using Corners = std::vector<cv::Point2f>;
 
-cv::Mat FloatPicture(const acquire::Frame& frame) {
-  // The matrix only looks at the counts here; convertTo copies.
-  const cv::Mat counts(frame.height,
-                       frame.width,
-                       CV_16UC1,
-                       const_cast<std::uint16_t*>(frame.counts.data()));
-  cv::Mat picture;
-  counts.convertTo(picture, CV_32F);
-  return picture;
+// The white balance that makes one grey picture of a mosaic, as the board is white,
+// grey and black.
+struct Grey {
+  std::string mosaic;
+  double dark_counts = 0;
+  std::array<double, 3> white{1, 1, 1};
+};
+
+Grey GreyOf(const acquire::SessionReader& session) {
+  Grey grey;
+  if (acquire::IsMosaic(session.manifest().camera.mosaic)) {
+    grey.mosaic = session.manifest().camera.mosaic;
+    grey.white = EstimateWhite(session);
+    grey.dark_counts = internal::MeanCounts(session.ReadFrame(
+        internal::PicturesOf(session, acquire::Target::kNothing).front()));
+  }
+  return grey;
+}
+
+cv::Mat FloatPicture(const acquire::Frame& frame, const Grey& grey) {
+  std::vector<float> values(frame.counts.begin(), frame.counts.end());
+  if (!grey.mosaic.empty()) {
+    for (float& value : values) {
+      value -= static_cast<float>(grey.dark_counts);
+    }
+    Balance(grey.mosaic, grey.white, frame.width, values);
+  }
+  return cv::Mat(frame.height, frame.width, CV_32FC1, values.data()).clone();
 }
 
 // Eight bits from nearly the darkest to nearly the brightest, for the detector.
-cv::Mat BytePicture(const acquire::Frame& frame) {
-  std::vector<std::uint16_t> sorted = frame.counts;
+cv::Mat BytePicture(const cv::Mat& values) {
+  std::vector<float> sorted(values.begin<float>(), values.end<float>());
   const auto rank = static_cast<std::ptrdiff_t>(sorted.size() / 200);
   std::nth_element(sorted.begin(), sorted.begin() + rank, sorted.end());
-  const double low = sorted[static_cast<std::size_t>(rank)];
+  const auto low = static_cast<double>(sorted[static_cast<std::size_t>(rank)]);
   std::nth_element(sorted.begin(), sorted.end() - 1 - rank, sorted.end());
-  const double high = *(sorted.end() - 1 - rank);
+  const auto high = static_cast<double>(*(sorted.end() - 1 - rank));
   const double scale = 255 / std::max(high - low, 1.0);
   cv::Mat picture;
-  FloatPicture(frame).convertTo(picture, CV_8U, scale, -low * scale);
+  values.convertTo(picture, CV_8U, scale, -low * scale);
   return picture;
 }
 
@@ -91,13 +114,15 @@ bool FindBoard(const cv::Mat& picture, cv::Size board, Corners& corners) {
   return true;
 }
 
-Corners FindCorners(const acquire::SessionReader& session, std::int64_t number) {
+Corners FindCorners(const acquire::SessionReader& session,
+                    const Grey& grey,
+                    std::int64_t number) {
   const acquire::TargetsDescription& targets = session.rig().targets;
   const cv::Size board(targets.checkerboard_columns, targets.checkerboard_rows);
   const std::string where = (session.folder() / session.Entry(number).file).string();
-  const acquire::Frame frame = session.ReadFrame(number);
+  const cv::Mat picture = FloatPicture(session.ReadFrame(number), grey);
   Corners corners;
-  const bool found = FindBoard(BytePicture(frame), board, corners);
+  const bool found = FindBoard(BytePicture(picture), board, corners);
   if (!found) {
     throw BadData(fmt::format(
         "{}: no checkerboard of {} x {} inner corners can be made out in pose {}; see "
@@ -116,7 +141,7 @@ Corners FindCorners(const acquire::SessionReader& session, std::int64_t number) 
   const int half_window = std::clamp(static_cast<int>(0.4F * closest), 2, 11);
   constexpr int kMaxIterations = 100;
   constexpr double kTolerancePx = 1e-4;
-  cv::cornerSubPix(FloatPicture(frame),
+  cv::cornerSubPix(picture,
                    corners,
                    cv::Size(half_window, half_window),
                    cv::Size(-1, -1),
@@ -169,10 +194,11 @@ CameraGeometry ToGeometry(const acquire::CameraInfo& info,
 GeometryResult EstimateGeometry(const acquire::SessionReader& session,
                                 const ProgressFunction& progress) {
   const acquire::RigDescription& rig = session.rig();
+  const Grey grey = GreyOf(session);
   std::vector<Corners> corners_px;
   for (std::int64_t number = 0; number < session.schedule().grid_begin(); ++number) {
     if (session.schedule()[number].target == acquire::Target::kCheckerboard) {
-      corners_px.push_back(FindCorners(session, number));
+      corners_px.push_back(FindCorners(session, grey, number));
       Report(progress,
              {.stage = "geometry",
               .done = std::ssize(corners_px),

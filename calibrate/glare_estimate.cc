@@ -59,7 +59,7 @@ Merged Merge(const acquire::SessionReader& session,
   for (const std::int64_t number :
        internal::PicturesOf(session, Target::kGlare, channel)) {
     const Frame frame = session.ReadFrame(number);
-    const std::vector<float> rates = pictures.Rates(frame);
+    const std::vector<float> rates = pictures.Rates(frame, channel);
     const std::vector<bool> good = Believable(frame, saturation_counts);
     merged.width = frame.width;
     merged.rates.resize(rates.size(), 0.0);
@@ -90,7 +90,7 @@ Blooming FindBlooming(const acquire::SessionReader& session,
   for (const std::int64_t number :
        internal::PicturesOf(session, Target::kGlare, channel)) {
     const Frame frame = session.ReadFrame(number);
-    const std::vector<float> rates = pictures.Rates(frame);
+    const std::vector<float> rates = pictures.Rates(frame, channel);
     const auto width = static_cast<std::size_t>(frame.width);
     constexpr double kFarOff = 6;
     const double variance = pictures.dark().variance_counts2;

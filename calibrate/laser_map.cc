@@ -246,7 +246,7 @@ Matches FindLattice(const acquire::SessionReader& session,
   const acquire::Frame frame = session.ReadFrame(number);
   const int count = static_cast<int>(nominal.size());
   const std::vector<PixelPoint> spots_px =
-      FindSpots(pictures.Rates(frame),
+      FindSpots(pictures.Rates(frame, session.schedule()[number].channel),
                 frame.width,
                 frame.height,
                 count,

@@ -3,6 +3,7 @@
 #include "acquire/session.h"
 #include "calibrate/dark.h"
 #include "calibrate/glare.h"
+#include "calibrate/mosaic.h"
 
 #include <memory>
 #include <vector>
@@ -13,16 +14,22 @@ namespace nacre::calibrate {
 /// far as it is known yet.
 class RatePictures {
  public:
-  RatePictures(const DarkResult& dark, const Linearity& linearity)
-      : dark_(dark), linearity_(linearity) {}
+  RatePictures(const DarkResult& dark,
+               const Linearity& linearity,
+               const ColourFilters& filters = {})
+      : dark_(dark), linearity_(linearity), filters_(filters) {}
 
   void SetAmbient(const SmoothField& ambient, int width, int height);
   void SetFlatField(const SmoothField& flat, int width, int height);
   void SetGlare(const Glare& glare, int width, int height);
 
-  /// Counts per µs, hot pixels filled in, ambient light and glare taken off, divided by
-  /// the flat field.
-  std::vector<float> Rates(const acquire::Frame& frame) const;
+  /// Counts per µs of a picture that this laser lit, hot pixels filled in, ambient
+  /// light and glare taken off, divided by the flat field. A mosaic's is filled in (see
+  /// mosaic.h): `Shares` tells which pixels really saw it.
+  std::vector<float> Rates(const acquire::Frame& frame, int channel) const;
+  std::vector<float> Shares(int channel, int width, int height) const {
+    return PixelShares(filters_, channel, width, height);
+  }
 
   const DarkResult& dark() const { return dark_; }
   const Linearity& linearity() const { return linearity_; }
@@ -30,6 +37,7 @@ class RatePictures {
  private:
   const DarkResult& dark_;
   Linearity linearity_;
+  ColourFilters filters_;
   std::vector<float> ambient_;
   std::vector<float> flat_;
   std::unique_ptr<GlareFilter> glare_;

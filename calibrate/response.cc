@@ -1,5 +1,6 @@
 #include "calibrate/response.h"
 
+#include "acquire/mosaic.h"
 #include "calibrate/internal/pictures.h"
 #include "calibrate/internal/smooth_fit.h"
 #include "core/error.h"
@@ -14,23 +15,45 @@ namespace {
 using acquire::Frame;
 using acquire::Target;
 
+// Which pixels to leave out, one set a colour: the hot ones and the other colours'.
+std::vector<std::vector<bool>> Excluded(const acquire::SessionReader& session,
+                                        const DarkResult& dark) {
+  const acquire::CameraInfo& camera = session.manifest().camera;
+  const auto pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::vector<bool> hot = internal::MaskOf(dark.hot_pixels, pixels);
+  if (!acquire::IsMosaic(camera.mosaic)) {
+    return {hot};
+  }
+  std::vector<std::vector<bool>> excluded(3, std::vector<bool>(pixels, true));
+  for (std::size_t k = 0; k < pixels; ++k) {
+    const auto width = static_cast<std::size_t>(camera.width);
+    const int colour = acquire::ColourAt(
+        camera.mosaic, static_cast<int>(k % width), static_cast<int>(k / width));
+    excluded[static_cast<std::size_t>(colour)][k] = !hot.empty() && hot[k];
+  }
+  return excluded;
+}
+
 // Counts above dark of the white card, the mean of all its pictures at an exposure.
 // Those of which a thousandth reaches saturation are left out.
 std::map<double, std::vector<float>> CardSignals(const acquire::SessionReader& session,
                                                  const DarkResult& dark,
                                                  double saturation_counts,
-                                                 int& width) {
+                                                 const std::vector<bool>& excluded) {
   std::map<double, std::vector<float>> sums;
   std::map<double, int> counts;
   for (const std::int64_t number : internal::PicturesOf(session, Target::kFlat)) {
     const Frame frame = session.ReadFrame(number);
-    width = frame.width;
-    const auto full = std::count_if(frame.counts.begin(),
-                                    frame.counts.end(),
-                                    [&](auto c) { return c >= saturation_counts; });
+    std::ptrdiff_t full = 0;
+    for (std::size_t k = 0; k < frame.counts.size(); ++k) {
+      full += frame.counts[k] >= saturation_counts && (excluded.empty() || !excluded[k])
+                  ? 1
+                  : 0;
+    }
     const double level = dark.level.Counts(frame.exposure_us);
     const auto most = static_cast<std::ptrdiff_t>(frame.counts.size() / 1000);
-    if (full > most + std::ssize(dark.hot_pixels)) {
+    if (full > most) {
       continue;
     }
     std::vector<float>& sum = sums[frame.exposure_us];
@@ -124,24 +147,29 @@ Linearity FitLinearity(const std::vector<Column>& columns, double saturation) {
 ResponseResult EstimateResponse(const acquire::SessionReader& session,
                                 const DarkResult& dark,
                                 double saturation_counts) {
-  int width = 0;
-  const auto signals = CardSignals(session, dark, saturation_counts, width);
-  if (signals.size() < 3) {
-    return {};
-  }
-  const std::vector<bool> hot =
-      internal::MaskOf(dark.hot_pixels, signals.begin()->second.size());
+  const int width = session.manifest().camera.width;
   constexpr int kSide = 16;
+  constexpr std::size_t kFewestExposures = 3;
   std::vector<Column> columns;
-  for (const auto& [exposure_us, signal] : signals) {
-    const auto blocks = internal::BlockMeans(signal, width, kSide, hot);
-    columns.resize(blocks.size());
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-      columns[k].t.push_back(exposure_us);
-      columns[k].c.push_back(blocks[k].mean);
+  for (const std::vector<bool>& excluded : Excluded(session, dark)) {
+    const auto signals = CardSignals(session, dark, saturation_counts, excluded);
+    if (signals.size() < kFewestExposures) {
+      continue;
+    }
+    const std::size_t first = columns.size();
+    for (const auto& [exposure_us, signal] : signals) {
+      const auto blocks = internal::BlockMeans(signal, width, kSide, excluded);
+      columns.resize(first + blocks.size());
+      for (std::size_t k = 0; k < blocks.size(); ++k) {
+        columns[first + k].t.push_back(exposure_us);
+        columns[first + k].c.push_back(blocks[k].mean);
+      }
     }
   }
   ResponseResult result;
+  if (columns.empty()) {
+    return result;
+  }
   result.linearity = FitLinearity(columns, saturation_counts);
   for (const Column& column : columns) {
     std::vector<double> linear;
@@ -165,38 +193,55 @@ FlatResult EstimateFlatField(const acquire::SessionReader& session,
                              const Linearity& linearity,
                              double saturation_counts,
                              double gain_electrons_per_count) {
-  int width = 0;
-  const auto signals = CardSignals(session, dark, saturation_counts, width);
+  const acquire::CameraInfo& camera = session.manifest().camera;
+  const auto pixels =
+      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  std::vector<float> relative(pixels, 0.0F);
+  std::vector<bool> unknown(pixels, true);
+  double variance = 0;  // of a pixel, relative; the mean over colours
+  double colours = 0;
+  for (const std::vector<bool>& excluded : Excluded(session, dark)) {
+    const auto signals = CardSignals(session, dark, saturation_counts, excluded);
+    if (signals.empty()) {
+      continue;
+    }
+    // Long exposures know most: weights are the exposures, the sum is of counts.
+    std::vector<double> sum(pixels, 0.0);
+    double counts = 0;
+    double count = 0;
+    for (std::size_t k = 0; k < pixels; ++k) {
+      if (!excluded.empty() && excluded[k]) {
+        continue;
+      }
+      for (const auto& [exposure_us, signal] : signals) {
+        sum[k] += linearity.Linear(static_cast<double>(signal[k]));
+      }
+      counts += sum[k];
+      count += 1;
+      unknown[k] = false;
+    }
+    const double mean = counts / count;
+    for (std::size_t k = 0; k < pixels; ++k) {
+      if (excluded.empty() || !excluded[k]) {
+        relative[k] = static_cast<float>(sum[k] / mean);
+      }
+    }
+    // Two pictures an exposure are averaged.
+    variance += 1 / (2 * mean * gain_electrons_per_count);
+    colours += 1;
+  }
   FlatResult result;
   result.field.value_if_empty = 1;
-  if (signals.empty()) {
+  if (colours == 0) {
     return result;
-  }
-  // Long exposures know most: weights are the exposures, the sum is of counts.
-  std::vector<float> sum(signals.begin()->second.size(), 0.0F);
-  double counts = 0;
-  for (const auto& [exposure_us, signal] : signals) {
-    for (std::size_t k = 0; k < sum.size(); ++k) {
-      const auto linear =
-          static_cast<float>(linearity.Linear(static_cast<double>(signal[k])));
-      sum[k] += linear;
-      counts += static_cast<double>(linear);
-    }
-  }
-  const auto pixels = static_cast<double>(sum.size());
-  const double mean = counts / pixels;
-  for (float& value : sum) {
-    value /= static_cast<float>(mean);
   }
   constexpr int kSide = 8;
   constexpr int kDegree = 6;
-  const auto blocks = internal::BlockMeans(
-      sum, width, kSide, internal::MaskOf(dark.hot_pixels, sum.size()));
+  const auto blocks = internal::BlockMeans(relative, camera.width, kSide, unknown);
   result.field = internal::FitSmoothField(blocks, kDegree);
   result.field.value_if_empty = 1;
   result.residual = internal::ResidualRms(blocks, result.field);
-  // Two pictures an exposure are averaged.
-  result.noise = 1 / std::sqrt(2 * mean * gain_electrons_per_count * kSide * kSide);
+  result.noise = std::sqrt(variance / colours) / kSide;
   return result;
 }
 

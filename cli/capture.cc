@@ -190,7 +190,7 @@ void TakeAll(acquire::SessionWriter& session,
     outcome.waits_for_disk += part.waits_for_disk;
   };
   add(acquire::CaptureCalibration(session, devices, progress, options));
-  const acquire::SessionReader targets(session.folder(), acquire::FrameView::kGrey);
+  const acquire::SessionReader targets(session.folder());
   const acquire::ScanMap map = session.manifest().scan_map
                                    ? *session.manifest().scan_map
                                    : calibrate::EstimateScanMap(targets, {}, progress);

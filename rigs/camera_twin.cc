@@ -64,7 +64,8 @@ acquire::CameraInfo CameraTwin::Info() const {
           .height = model_.geometry.height_px,
           .bit_depth = model_.sensor.bit_depth,
           .min_exposure_us = kMinExposureUs,
-          .max_exposure_us = kMaxExposureUs};
+          .max_exposure_us = kMaxExposureUs,
+          .mosaic = model_.filters.mosaic};
 }
 
 double CameraTwin::SetExposureUs(double exposure_us) {
@@ -137,6 +138,7 @@ std::vector<float> CameraTwin::ComputeAmbient() const {
     }
   }
   optics_.Apply(picture);
+  ApplyFilters(model_.filters.mosaic, model_.filters.white, rays_.width, picture);
   return picture;
 }
 
@@ -200,6 +202,10 @@ void CameraTwin::ComputeRates(std::uint64_t picture_number,
   if (is_laser && model_.light_noise.speckle_contrast > 0) {
     AddSpeckle(model_.light_noise.speckle_contrast, model_.seed, *world_, rates);
   }
+  ApplyFilters(model_.filters.mosaic,
+               is_laser ? model_.filters.Laser(channel) : model_.filters.white,
+               rays_.width,
+               rates);
 }
 
 void CameraTwin::ComputeSampleRates(const std::vector<Spot>& spots,

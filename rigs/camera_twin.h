@@ -2,6 +2,7 @@
 
 #include "acquire/camera.h"
 #include "rigs/checkerboard.h"
+#include "rigs/colour_filters.h"
 #include "rigs/laser_view.h"
 #include "rigs/light_noise.h"
 #include "rigs/optics.h"
@@ -50,6 +51,7 @@ struct CameraModel {
   /// Of the sample's gloss: the lit spot is seen like a diffuse target's of so much.
   double specular_reflectance = 0;
   OpticsModel optics;
+  FilterModel filters;
   AmbientModel ambient;
   LightNoiseModel light_noise;
   std::optional<PatchModel> patch;

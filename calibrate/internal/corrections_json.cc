@@ -2,6 +2,8 @@
 
 #include "calibrate/internal/json_numbers.h"
 
+#include <algorithm>
+#include <array>
 #include <fmt/format.h>
 
 namespace nacre::calibrate::internal {
@@ -115,6 +117,59 @@ std::vector<SpotProfile> SpotsFromJson(const Json& json, const std::string& orig
   return spots;
 }
 
+Json ToJson(const ColourFilters& filters) {
+  return Json{{"mosaic", filters.mosaic},
+              {"white", filters.white},
+              {"ambient", filters.ambient},
+              {"lasers", filters.lasers}};
+}
+
+std::array<double, 3> SharesFromJson(const Json& json,
+                                     const char* key,
+                                     const std::string& origin) {
+  const std::vector<double> values = List(json, key, origin);
+  std::array<double, 3> shares{};
+  if (values.size() != shares.size() ||
+      !std::all_of(
+          values.begin(), values.end(), [](double x) { return x >= 0 && x <= 1; }) ||
+      *std::max_element(values.begin(), values.end()) <= 0) {
+    throw BadData(fmt::format(
+        "{}: field '{}' must hold what red, green and blue pixels see, 0 to 1",
+        origin,
+        key));
+  }
+  std::copy(values.begin(), values.end(), shares.begin());
+  return shares;
+}
+
+// Files before there were mosaics have none of it.
+ColourFilters FiltersFromJson(const Json& json,
+                              const std::string& origin,
+                              std::size_t channel_count) {
+  ColourFilters filters;
+  filters.mosaic = Get<std::string>(json, "mosaic", origin);
+  if (filters.mosaic.empty()) {
+    return filters;
+  }
+  constexpr std::array<const char*, 4> kMosaics = {"RGGB", "GRBG", "GBRG", "BGGR"};
+  if (std::find(kMosaics.begin(), kMosaics.end(), filters.mosaic) == kMosaics.end()) {
+    throw BadData(fmt::format(
+        "{}: field 'mosaic': '{}' is no mosaic of colours", origin, filters.mosaic));
+  }
+  filters.white = SharesFromJson(json, "white", origin);
+  filters.ambient = SharesFromJson(json, "ambient", origin);
+  for (const Json& laser : Get<Json>(json, "lasers", origin)) {
+    filters.lasers.push_back(SharesFromJson(Json{{"lasers", laser}}, "lasers", origin));
+  }
+  if (filters.lasers.size() != channel_count) {
+    throw BadData(fmt::format("{}: field 'lasers' holds {} of {} channels",
+                              origin,
+                              filters.lasers.size(),
+                              channel_count));
+  }
+  return filters;
+}
+
 Json WarningsToJson(const std::vector<Warning>& warnings) {
   Json list = Json::array();
   for (const Warning& warning : warnings) {
@@ -135,7 +190,8 @@ std::vector<Warning> WarningsFromJson(const Json& json, const std::string& origi
 }  // namespace
 
 Json ToJson(const Corrections& c) {
-  return Json{{"linearity",
+  return Json{{"filters", ToJson(c.filters)},
+              {"linearity",
                {{"b1_per_count", c.linearity.b1_per_count},
                 {"b2_per_count2", c.linearity.b2_per_count2},
                 {"sigma_at_saturation", c.linearity.sigma_at_saturation}}},
@@ -160,13 +216,17 @@ Json ToJson(const Corrections& c) {
 
 Corrections CorrectionsFromJson(const Json& json,
                                 const std::string& origin,
-                                std::int64_t pixel_count) {
+                                std::int64_t pixel_count,
+                                std::size_t channel_count) {
   const auto part = [&](const char* key) { return Get<Json>(json, key, origin); };
   const auto number = [&](const char* key) {
     return Number(json, key, origin, kNotNegative);
   };
   constexpr Range kReachPx{0, 1 << 16};
   Corrections c;
+  if (json.contains("filters")) {
+    c.filters = FiltersFromJson(part("filters"), origin + ": filters", channel_count);
+  }
   const Json linearity = part("linearity");
   c.linearity = {.b1_per_count = Number(linearity, "b1_per_count", origin),
                  .b2_per_count2 = Number(linearity, "b2_per_count2", origin),

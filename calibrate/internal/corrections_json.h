@@ -13,6 +13,7 @@ Json ToJson(const Corrections& corrections);
 /// be a hot pixel outside of the `pixel_count` there are.
 Corrections CorrectionsFromJson(const Json& json,
                                 const std::string& origin,
-                                std::int64_t pixel_count);
+                                std::int64_t pixel_count,
+                                std::size_t channel_count);
 
 }  // namespace nacre::calibrate::internal

@@ -40,6 +40,7 @@ std::vector<bool> MaskOf(const std::vector<HotPixel>& pixels, std::size_t pixel_
 
 void FillHotPixels(const std::vector<HotPixel>& pixels,
                    int width,
+                   int step,
                    std::vector<float>& picture) {
   const std::vector<bool> hot = MaskOf(pixels, picture.size());
   const int height = static_cast<int>(std::ssize(picture)) / width;
@@ -48,8 +49,8 @@ void FillHotPixels(const std::vector<HotPixel>& pixels,
     const int y = pixel.index / width;
     float sum = 0;
     int count = 0;
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
+    for (int dy = -step; dy <= step; dy += step) {
+      for (int dx = -step; dx <= step; dx += step) {
         if (x + dx < 0 || x + dx >= width || y + dy < 0 || y + dy >= height) {
           continue;
         }

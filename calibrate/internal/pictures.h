@@ -20,9 +20,11 @@ double MeanCounts(const acquire::Frame& frame);
 /// A mask of a picture's hot pixels; empty if there are none.
 std::vector<bool> MaskOf(const std::vector<HotPixel>& pixels, std::size_t pixel_count);
 
-/// Replaces hot pixels by the mean of their neighbours that aren't.
+/// Replaces hot pixels by the mean of their neighbours that aren't; those are `step`
+/// pixels away, 2 in a mosaic.
 void FillHotPixels(const std::vector<HotPixel>& pixels,
                    int width,
+                   int step,
                    std::vector<float>& picture);
 
 }  // namespace nacre::calibrate::internal

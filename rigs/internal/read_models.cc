@@ -1,5 +1,7 @@
 #include "rigs/internal/read_models.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
@@ -119,6 +121,37 @@ void ReadLamp(const std::optional<TomlTable>& table, CameraModel& camera) {
   table->RejectUnknownKeys();
 }
 
+// What filters of each colour let through of every laser, and of white light.
+void ReadFilters(const std::optional<TomlTable>& table,
+                 std::size_t channel_count,
+                 CameraModel& camera) {
+  if (!table) {
+    return;
+  }
+  FilterModel& filters = camera.filters;
+  filters.mosaic = table->Text("mosaic");
+  constexpr std::array<const char*, 4> kMosaics = {"RGGB", "GRBG", "GBRG", "BGGR"};
+  if (std::find(kMosaics.begin(), kMosaics.end(), filters.mosaic) == kMosaics.end()) {
+    throw table->At("mosaic", "expected RGGB, GRBG, GBRG or BGGR");
+  }
+  const Range share{0, 1};
+  filters.lasers.resize(channel_count);
+  constexpr std::array<const char*, 3> kColours = {"red", "green", "blue"};
+  for (std::size_t colour = 0; colour < kColours.size(); ++colour) {
+    const std::vector<double> lasers =
+        PerChannel(*table, kColours[colour], share, channel_count);
+    for (std::size_t channel = 0; channel < channel_count; ++channel) {
+      filters.lasers[channel][colour] = lasers[channel];
+    }
+  }
+  const std::vector<double> white = table->Numbers("white", share);
+  if (white.size() != filters.white.size()) {
+    throw table->At("white", "expected three numbers: red, green and blue filters");
+  }
+  std::copy(white.begin(), white.end(), filters.white.begin());
+  table->RejectUnknownKeys();
+}
+
 SamplePose ReadSample(const std::optional<TomlTable>& table, CameraModel& camera) {
   SamplePose pose;
   if (table) {
@@ -155,6 +188,7 @@ RigModels ReadModels(const TomlTable& simulated, const acquire::RigDescription& 
   camera = ReadCamera(simulated.Table("camera"), channels.size());
   models.laser = ReadLaser(simulated.Table("laser"), channels, camera.light_noise);
   ReadLamp(simulated.FindTable("lamp"), camera);
+  ReadFilters(simulated.FindTable("filters"), channels.size(), camera);
   ReadAmbient(simulated.FindTable("ambient"), camera);
   camera.sample_pose = ReadSample(simulated.FindTable("sample"), camera);
   models.laser.sample = camera.sample_pose;
