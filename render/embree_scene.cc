@@ -5,8 +5,10 @@
 
 #include <embree3/rtcore.h>
 
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <map>
 #include <tbb/task_arena.h>
 
 namespace nacre::render {
@@ -77,37 +79,88 @@ RTCRay ToEmbree(const Ray& ray) {
 struct EmbreeScene::Handles {
   RTCDevice device = nullptr;
   RTCScene scene = nullptr;
+  std::map<std::size_t, RTCScene> groups;  ///< by the first of their shapes
   ~Handles() {
     if (scene != nullptr) {
       rtcReleaseScene(scene);
+    }
+    for (const auto& group : groups) {
+      rtcReleaseScene(group.second);
     }
     if (device != nullptr) {
       rtcReleaseDevice(device);
     }
   }
+
+  RTCScene NewScene() const {
+    const RTCScene made = rtcNewScene(device);
+    rtcSetSceneFlags(made, RTC_SCENE_FLAG_ROBUST);
+    rtcSetSceneBuildQuality(made, RTC_BUILD_QUALITY_MEDIUM);
+    return made;
+  }
+
+  void Attach(RTCScene to, RTCGeometry geometry, std::size_t id) const {
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometryByID(to, geometry, static_cast<unsigned>(id));
+    rtcReleaseGeometry(geometry);
+  }
+
+  void Attach(RTCScene to, const Shape& shape, std::size_t id) const {
+    const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
+    Attach(to,
+           mesh != nullptr ? MeshGeometry(device, *mesh)
+                           : SphereGeometry(device, std::get<Sphere>(shape.geometry)),
+           id);
+  }
+
+  // An instance's geometry has the number of all shapes and the instances before it.
+  void Attach(const std::vector<Shape>& shapes,
+              const ShapeInstance& instance,
+              std::size_t id) {
+    RTCScene& group = groups[instance.first];
+    if (group == nullptr) {
+      group = NewScene();
+      for (std::size_t i = 0; i < instance.count; ++i) {
+        Attach(group, shapes[instance.first + i], i);
+      }
+      rtcCommitScene(group);
+    }
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
+    rtcSetGeometryInstancedScene(geometry, group);
+    std::array<float, 12> columns{};
+    for (std::size_t k = 0; k < columns.size(); ++k) {
+      const auto row = static_cast<int>(k % 3);
+      columns[k] = static_cast<float>(instance.to_world(row, static_cast<int>(k / 3)));
+    }
+    rtcSetGeometryTransform(
+        geometry, 0, RTC_FORMAT_FLOAT3X4_COLUMN_MAJOR, columns.data());
+    Attach(scene, geometry, id);
+  }
 };
 
-EmbreeScene::EmbreeScene(const std::vector<Shape>& shapes, int thread_count)
-    : shapes_(shapes), handles_(std::make_unique<Handles>()) {
+EmbreeScene::EmbreeScene(const std::vector<Shape>& shapes,
+                         std::vector<ShapeInstance> instances,
+                         int thread_count)
+    : shapes_(shapes),
+      instances_(std::move(instances)),
+      handles_(std::make_unique<Handles>()) {
   // Its "threads=" would limit all of oneTBB, and stay; an arena limits the build
   // alone.
   handles_->device = rtcNewDevice(nullptr);
   CheckEmbree(handles_->device, "to start");
-  handles_->scene = rtcNewScene(handles_->device);
-  rtcSetSceneFlags(handles_->scene, RTC_SCENE_FLAG_ROBUST);
-  rtcSetSceneBuildQuality(handles_->scene, RTC_BUILD_QUALITY_MEDIUM);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const auto* mesh = std::get_if<TriangleMesh>(&shapes[i].geometry);
-    const RTCGeometry geometry =
-        mesh != nullptr
-            ? MeshGeometry(handles_->device, *mesh)
-            : SphereGeometry(handles_->device, std::get<Sphere>(shapes[i].geometry));
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometryByID(handles_->scene, geometry, static_cast<unsigned>(i));
-    rtcReleaseGeometry(geometry);
-  }
+  handles_->scene = handles_->NewScene();
   tbb::task_arena arena(ThreadCount(thread_count));
-  arena.execute([&] { rtcCommitScene(handles_->scene); });
+  arena.execute([&] {
+    for (std::size_t i = 0; i < shapes.size(); ++i) {
+      if (!shapes[i].instanced) {
+        handles_->Attach(handles_->scene, shapes[i], i);
+      }
+    }
+    for (std::size_t k = 0; k < instances_.size(); ++k) {
+      handles_->Attach(shapes, instances_[k], shapes.size() + k);
+    }
+    rtcCommitScene(handles_->scene);
+  });
   CheckEmbree(handles_->device, "to build the scene");
   if (shapes.empty()) {
     return;
@@ -133,11 +186,27 @@ bool EmbreeScene::Intersect(const Ray& ray, SurfaceHit& hit) const {
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) {
     return false;
   }
-  const Shape& shape = shapes_[query.hit.geomID];
-  hit = std::holds_alternative<TriangleMesh>(shape.geometry)
-            ? MeshPoint(shape, query.hit.primID, {query.hit.u, query.hit.v})
-            : SpherePoint(shape, ray.origin + ray.direction * query.ray.tfar);
-  hit.shape_index = query.hit.geomID;
+  const bool instanced = query.hit.instID[0] != RTC_INVALID_GEOMETRY_ID;
+  const ShapeInstance* const instance =
+      instanced ? &instances_[query.hit.instID[0] - shapes_.size()] : nullptr;
+  const auto index =
+      static_cast<std::uint32_t>(query.hit.geomID + (instanced ? instance->first : 0));
+  const Shape& shape = shapes_[index];
+  if (std::holds_alternative<TriangleMesh>(shape.geometry)) {
+    hit = MeshPoint(shape, query.hit.primID, {query.hit.u, query.hit.v});
+  } else if (!instanced) {
+    hit = SpherePoint(shape, ray.origin + ray.direction * query.ray.tfar);
+  } else {
+    // Embree's normal is that of the group's own space.
+    const Sphere& sphere = std::get<Sphere>(shape.geometry);
+    const Vec3 outward =
+        Normalized(Vec3{query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z});
+    hit = SpherePoint(shape, sphere.center + outward * sphere.radius);
+  }
+  if (instanced) {
+    hit = Moved(hit, instance->to_world);
+  }
+  hit.shape_index = index;
   hit.distance = query.ray.tfar;
   return true;
 }

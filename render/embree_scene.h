@@ -12,7 +12,9 @@ namespace nacre::render {
 class EmbreeScene {
  public:
   /// `shapes` must outlive it.
-  EmbreeScene(const std::vector<Shape>& shapes, int thread_count);
+  EmbreeScene(const std::vector<Shape>& shapes,
+              std::vector<ShapeInstance> instances,
+              int thread_count);
   ~EmbreeScene();
   EmbreeScene(const EmbreeScene&) = delete;
   EmbreeScene& operator=(const EmbreeScene&) = delete;
@@ -27,6 +29,7 @@ class EmbreeScene {
  private:
   struct Handles;
   const std::vector<Shape>& shapes_;
+  std::vector<ShapeInstance> instances_;
   std::unique_ptr<Handles> handles_;
   Vec3 center_;
   float radius_ = 0;

@@ -28,6 +28,7 @@ struct Scene {
   Film film;
   int samples_per_pixel = 64;
   std::vector<Shape> shapes;
+  std::vector<ShapeInstance> instances;
   std::vector<Light> lights;
   /// What was read but has no effect or another one than elsewhere; for people.
   std::vector<std::string> notes;

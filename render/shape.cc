@@ -91,6 +91,16 @@ SurfaceHit MeshPoint(const Shape& shape, std::uint32_t triangle, Vec2 barycentri
   return hit;
 }
 
+SurfaceHit Moved(const SurfaceHit& hit, const Transform& to_world) {
+  SurfaceHit moved = hit;
+  moved.position = to_world.Point(hit.position);
+  moved.face_normal = to_world.Normal(hit.face_normal);
+  moved.normal = to_world.Normal(hit.normal);
+  moved.offset = Length(to_world.Vector(hit.face_normal)) * hit.offset +
+                 kOffset * MaxAbs(moved.position);
+  return moved;
+}
+
 float SurfaceOffset(const Sphere& sphere) {
   return kOffset * (MaxAbs(sphere.center) + sphere.radius);
 }

@@ -3,6 +3,7 @@
 #include "render/bsdf/bsdfs.h"
 #include "render/mesh.h"
 #include "render/subsurface/subsurface.h"
+#include "render/transform.h"
 
 #include <cstdint>
 #include <memory>
@@ -38,6 +39,15 @@ struct Shape {
   std::optional<Color> radiance;  ///< emitted on the outside
   float sampling_weight = 1;      ///< of the emission, among the lights
   std::optional<Translucency> translucency;
+  bool instanced = false;  ///< is only where a `ShapeInstance` puts it
+};
+
+/// Shapes [first, first + count) of a scene once more, elsewhere. They neither shine
+/// nor let light through: those are copied instead.
+struct ShapeInstance {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  Transform to_world;
 };
 
 /// A point of a surface.
@@ -59,6 +69,9 @@ struct SurfaceHit {
 /// it.
 SurfaceHit MeshPoint(const Shape& shape, std::uint32_t triangle, Vec2 barycentric);
 SurfaceHit SpherePoint(const Shape& shape, Vec3 near_point);
+
+/// A hit of a shape as it is in an instance.
+SurfaceHit Moved(const SurfaceHit& hit, const Transform& to_world);
 
 /// SurfaceHit::offset of any point of a sphere.
 float SurfaceOffset(const Sphere& sphere);

@@ -8,6 +8,7 @@ namespace nacre::render {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kUniformSpherePdf = 0.25F * kInvPi;
 
 LightSample FromPoint(Vec3 light, Color intensity, Vec3 position) {
   const Vec3 to_light = light - position;
@@ -114,7 +115,7 @@ Ray ShadowRay(const SurfaceHit& hit, const LightSample& light) {
 
 World::World(const Scene& scene, int thread_count)
     : scene_(scene),
-      geometry_(scene.shapes, thread_count),
+      geometry_(scene.shapes, scene.instances, thread_count),
       source_of_shape_(scene.shapes.size(), -1) {
   const float radius = std::max(geometry_.radius(), 1e-6F);
   for (const Light& light : scene.lights) {
@@ -212,14 +213,15 @@ LightSample World::SampleLight(std::size_t light,
             sample.pdf,
             false};
   }
+  const Color radiance = std::get<ConstantLight>(any).radiance;
+  if (side == Vec3{}) {
+    return {
+        SquareToSphere(u), kInfinity, radiance / kUniformSpherePdf, kUniformSpherePdf};
+  }
   // A constant light is best sampled by the cosine at the surface.
   const Vec3 local = SquareToCosineHemisphere(u);
   const float pdf = CosineHemispherePdf(local.z);
-  return {Frame(side).ToWorld(local),
-          kInfinity,
-          std::get<ConstantLight>(any).radiance / pdf,
-          pdf,
-          false};
+  return {Frame(side).ToWorld(local), kInfinity, radiance / pdf, pdf, false};
 }
 
 LightSample World::SampleEmitter(const Source& source, Vec3 position, Vec2 u) const {
@@ -287,12 +289,13 @@ Color World::Background(Vec3 direction) const {
 }
 
 float World::BackgroundPdf(Vec3 side, Vec3 wi) const {
+  const float constant_pdf =
+      side == Vec3{} ? kUniformSpherePdf : CosineHemispherePdf(Dot(side, wi));
   float sum = 0;
   for (const std::size_t i : backgrounds_) {
     const auto* far = std::get_if<EnvironmentLight>(&sources_[i].light->source);
-    sum +=
-        sources_[i].probability * (far != nullptr ? far->environment->Pdf(wi)
-                                                  : CosineHemispherePdf(Dot(side, wi)));
+    sum += sources_[i].probability *
+           (far != nullptr ? far->environment->Pdf(wi) : constant_pdf);
   }
   return sum;
 }

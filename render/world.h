@@ -34,7 +34,8 @@ class World {
   const Scene& scene() const { return scene_; }
   const EmbreeScene& geometry() const { return geometry_; }
 
-  /// One light chosen by its power. `side`: the normal on the side that is lit.
+  /// One light chosen by its power. `side`: the normal on the side that is lit, or 0 if
+  /// light counts from everywhere.
   LightSample SampleLight(Vec3 position, Vec3 side, float u_light, Vec2 u) const;
   /// The same of a given light, in [0, light_count()).
   LightSample SampleLight(std::size_t light, Vec3 position, Vec3 side, Vec2 u) const;

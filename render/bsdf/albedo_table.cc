@@ -17,35 +17,43 @@ float NodeCosine(int k) {
   return std::max(1e-4F, t * t);
 }
 
-float Albedo(const Microfacet& facets,
-             const std::function<float(float)>& reflectance,
-             float cos_o) {
+float Albedo(const std::function<float(Vec3 wo, Vec2 u)>& weight, float cos_o) {
   const Vec3 wo{std::sqrt(std::max(0.0F, 1 - cos_o * cos_o)), 0, cos_o};
   double sum = 0;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     Sampler sampler(0, i);
-    const Vec3 m = facets.SampleNormal(wo, sampler.Next2D());
-    const float cos_om = Dot(wo, m);
-    const float cos_i = 2 * cos_om * m.z - cos_o;
-    if (cos_om <= 0 || cos_i <= 0) {
-      continue;
-    }
-    const float pdf = facets.NormalPdf(wo, m) / (4 * cos_om);
-    const float f_cos = facets.D(m) * facets.G2(cos_o, cos_i) / (4 * cos_o);
-    if (pdf > 0) {
-      sum += static_cast<double>(reflectance(std::min(cos_om, 1.0F)) * f_cos / pdf);
-    }
+    sum += static_cast<double>(weight(wo, sampler.Next2D()));
   }
   return static_cast<float>(std::min(1.0, sum / kSamples));
+}
+
+float ReflectedWeight(const Microfacet& facets,
+                      const std::function<float(float)>& reflectance,
+                      Vec3 wo,
+                      Vec2 u) {
+  const Vec3 m = facets.SampleNormal(wo, u);
+  const float cos_om = Dot(wo, m);
+  const float cos_i = 2 * cos_om * m.z - wo.z;
+  if (cos_om <= 0 || cos_i <= 0) {
+    return 0;
+  }
+  const float pdf = facets.NormalPdf(wo, m) / (4 * cos_om);
+  const float f_cos = facets.D(m) * facets.G2(wo.z, cos_i) / (4 * wo.z);
+  return pdf > 0 ? reflectance(std::min(cos_om, 1.0F)) * f_cos / pdf : 0;
 }
 
 }  // namespace
 
 AlbedoTable::AlbedoTable(const Microfacet& facets,
                          const std::function<float(float)>& reflectance)
+    : AlbedoTable([&](Vec3 wo, Vec2 u) {
+        return ReflectedWeight(facets, reflectance, wo, u);
+      }) {}
+
+AlbedoTable::AlbedoTable(const std::function<float(Vec3 wo, Vec2 u)>& weight)
     : values_(kNodes) {
   for (int k = 0; k < kNodes; ++k) {
-    values_[static_cast<std::size_t>(k)] = Albedo(facets, reflectance, NodeCosine(k));
+    values_[static_cast<std::size_t>(k)] = Albedo(weight, NodeCosine(k));
   }
   constexpr int kPanels = 4096;
   double sum = 0;

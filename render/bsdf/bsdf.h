@@ -29,6 +29,8 @@ class Bsdf {
   virtual BsdfSample Sample(Vec3 wo, Vec2 uv, float u_lobe, Vec2 u) const = 0;
   /// True if Evaluate is 0 everywhere, so that sampling lights is useless.
   virtual bool IsDelta() const { return false; }
+  /// True if Evaluate isn't 0 for directions on different sides.
+  virtual bool Transmits() const { return false; }
 };
 
 }  // namespace nacre::render

@@ -46,6 +46,11 @@ struct DielectricParameters {
 /// A smooth interface that light crosses.
 BsdfPtr MakeDielectric(const DielectricParameters& parameters);
 
+/// The same with facets, and with the energy that single bounces between them lose put
+/// back on both sides, after [Kulla & Conty 17].
+BsdfPtr MakeRoughDielectric(const DielectricParameters& parameters,
+                            const Microfacet& facets);
+
 /// The front of `front` on both sides.
 BsdfPtr MakeTwoSided(BsdfPtr front);
 

@@ -46,6 +46,7 @@ class TwoSided : public Bsdf {
   }
 
   bool IsDelta() const override { return front_->IsDelta(); }
+  bool Transmits() const override { return front_->Transmits(); }
 
  private:
   static Vec3 Mirror(Vec3 w) { return {w.x, w.y, -w.z}; }

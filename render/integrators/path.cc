@@ -23,6 +23,14 @@ bool IsBlack(Color c) {
   return c.x == 0 && c.y == 0 && c.z == 0;
 }
 
+// Where light may come from: World::SampleLight's `side`.
+Vec3 LitSide(const SurfaceHit& hit, Vec3 wo) {
+  if (hit.shape->bsdf->Transmits()) {
+    return {};
+  }
+  return wo.z > 0 ? hit.normal : -hit.normal;
+}
+
 }  // namespace
 
 struct PathTracer::State {
@@ -134,10 +142,9 @@ void PathTracer::AddDirectLight(State& state,
   if (world_.light_count() == 0) {
     return;
   }
-  const Vec3 side = wo.z > 0 ? hit.normal : -hit.normal;
   const float u_light = world_.light_count() > 1 ? state.sampler.Next1D() : 0;
-  const LightSample light =
-      world_.SampleLight(hit.position, side, u_light, state.sampler.Next2D());
+  const LightSample light = world_.SampleLight(
+      hit.position, LitSide(hit, wo), u_light, state.sampler.Next2D());
   if (!(light.pdf > 0)) {
     return;
   }
@@ -187,7 +194,7 @@ bool PathTracer::Continue(State& state,
                 MaxComponent(state.throughput) > kSharpThroughput;
   state.pdf = sample.pdf;
   state.origin = hit.position;
-  state.side = wo.z > 0 ? hit.normal : -hit.normal;
+  state.side = LitSide(hit, wo);
   state.count_emission = true;
   state.ray = {OffsetOrigin(hit, wi), wi};
   ++state.depth;

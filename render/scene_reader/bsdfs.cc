@@ -86,6 +86,14 @@ ConductorParameters ReadConductor(Element& element) {
   return p;
 }
 
+DielectricParameters ReadDielectric(Element& element) {
+  DielectricParameters p;
+  p.eta = RelativeIndex(element, "bk7");
+  p.specular_reflectance = element.Reflectance("specularReflectance", kWhite);
+  p.specular_transmittance = element.Reflectance("specularTransmittance", kWhite);
+  return p;
+}
+
 BsdfPtr ReadTwoSided(Element& element) {
   std::vector<BsdfPtr> nested;
   for (const Element& child : element.Objects("bsdf")) {
@@ -123,11 +131,14 @@ BsdfPtr MakeOfType(Element& element, const std::string& type) {
     return MakeRoughConductor(conductor, ReadMicrofacet(element));
   }
   if (type == "dielectric") {
-    DielectricParameters p;
-    p.eta = RelativeIndex(element, "bk7");
-    p.specular_reflectance = element.Reflectance("specularReflectance", kWhite);
-    p.specular_transmittance = element.Reflectance("specularTransmittance", kWhite);
-    return MakeDielectric(p);
+    return MakeDielectric(ReadDielectric(element));
+  }
+  if (type == "roughdielectric") {
+    const DielectricParameters dielectric = ReadDielectric(element);
+    if (dielectric.eta == 1) {
+      element.Fail("facets between equal indices (intIOR, extIOR) don't refract");
+    }
+    return MakeRoughDielectric(dielectric, ReadMicrofacet(element));
   }
   if (type == "twosided") {
     return ReadTwoSided(element);
@@ -147,6 +158,7 @@ BsdfPtr ReadBsdf(Element element) {
                    "conductor",
                    "roughconductor",
                    "dielectric",
+                   "roughdielectric",
                    "twosided"});
     bsdf = MakeDiffuse(MakeConstant({0.5F, 0.5F, 0.5F}));
   } else {

@@ -12,16 +12,28 @@
 
 namespace nacre::render {
 
+/// What instances repeat.
+struct ShapeGroup {
+  std::size_t first = 0;  ///< of the scene's shapes
+  std::size_t count = 0;
+  std::vector<Shape> translucent;  ///< each instance has its own
+};
+
 /// What all parts of the reader share: the text with its lines, the `$name`s, objects
 /// with an id, and the scene being built.
 struct Document {
   std::string origin;
   std::string text;
   std::filesystem::path folder;
+  std::vector<std::filesystem::path>
+      included;  ///< files now being read, outermost first
+  bool has_sensor = false;
+  bool has_integrator = false;
   bool lenient = false;
   std::map<std::string, std::string> defines;
-  std::map<std::string, BsdfPtr> bsdfs;        ///< by id
-  std::map<std::string, TexturePtr> textures;  ///< by id
+  std::map<std::string, BsdfPtr> bsdfs;            ///< by id
+  std::map<std::string, TexturePtr> textures;      ///< by id
+  std::map<std::string, ShapeGroup> shape_groups;  ///< by id
   Scene scene;
 
   /// "file:line" of a node.

@@ -16,6 +16,12 @@ Bitmap ReadPicture(Element& element);
 BsdfPtr ReadBsdf(Element element);
 void ReadEmitter(Element element);
 void ReadShape(Element element);
+/// A shape that isn't in the scene yet; none if its type isn't known.
+std::optional<Shape> MakeShape(Element element);
+/// The shape after a transform. Throws for a sphere that would be none.
+Shape Transformed(const Element& element, Shape shape, const Transform& to_world);
+void ReadShapeGroup(Element element);
+void ReadInstance(Element element);
 void ReadSensor(Element element);
 void ReadIntegrator(Element element);
 Translucency ReadSubsurface(Element element);

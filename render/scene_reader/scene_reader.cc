@@ -2,10 +2,14 @@
 #include "render/scene.h"
 #include "render/scene_reader/objects.h"
 
+#include <algorithm>
+#include <functional>
+
 namespace nacre::render {
 namespace {
 
 constexpr std::uint64_t kMaxSceneBytes = std::uint64_t{256} << 20;
+constexpr std::size_t kMaxIncludes = 16;
 
 void ReadDefault(Document& document, const pugi::xml_node& node) {
   const std::string name = document.RequiredAttribute(node, "name");
@@ -13,10 +17,27 @@ void ReadDefault(Document& document, const pugi::xml_node& node) {
   document.defines.try_emplace(name, document.RequiredAttribute(node, "value"));
 }
 
+// A scene has one of it, wherever that is.
+void ReadOnly(Document& document,
+              const pugi::xml_node& node,
+              bool& is_there,
+              void (*read)(Element)) {
+  if (is_there) {
+    throw document.ErrorAt(node,
+                           fmt::format("a second <{}>: a scene has one", node.name()));
+  }
+  is_there = true;
+  read(Element(document, node));
+}
+
+void ReadInclude(Document& document, const pugi::xml_node& node);
+
 void ReadTopLevel(Document& document, const pugi::xml_node& node) {
   const std::string tag = node.name();
   if (tag == "default") {
     ReadDefault(document, node);
+  } else if (tag == "include") {
+    ReadInclude(document, node);
   } else if (tag == "bsdf") {
     ReadBsdf(Element(document, node));
   } else if (tag == "texture") {
@@ -27,15 +48,16 @@ void ReadTopLevel(Document& document, const pugi::xml_node& node) {
   } else if (tag == "shape") {
     ReadShape(Element(document, node));
   } else if (tag == "sensor") {
-    ReadSensor(Element(document, node));
+    ReadOnly(document, node, document.has_sensor, ReadSensor);
   } else if (tag == "integrator") {
-    ReadIntegrator(Element(document, node));
+    ReadOnly(document, node, document.has_integrator, ReadIntegrator);
   } else {
     document.Unknown(node,
                      fmt::format("no element <{}> in a <scene>{}",
                                  tag,
                                  Suggestion(tag,
                                             {"default",
+                                             "include",
                                              "bsdf",
                                              "texture",
                                              "emitter",
@@ -45,25 +67,64 @@ void ReadTopLevel(Document& document, const pugi::xml_node& node) {
   }
 }
 
-void CheckCount(const Document& document, const pugi::xml_node& root, const char* tag) {
-  const auto found = root.children(tag);
-  const auto count = std::distance(found.begin(), found.end());
-  if (count > 1) {
-    throw document.ErrorAt(*std::next(found.begin()),
-                           fmt::format("a second <{}>: a scene has one", tag));
+// Reads all of document.text; `read` gets its <scene>.
+void ReadText(Document& document,
+              const std::function<void(const pugi::xml_node& root)>& read) {
+  const std::string& text = document.text;
+  pugi::xml_document parsed;
+  const pugi::xml_parse_result result = parsed.load_buffer(
+      text.data(), text.size(), pugi::parse_default, pugi::encoding_utf8);
+  if (!result) {
+    const auto offset = std::clamp<std::ptrdiff_t>(result.offset, 0, std::ssize(text));
+    const auto line = 1 + std::count(text.begin(), text.begin() + offset, '\n');
+    throw BadData(
+        fmt::format("{}:{}: not XML: {}", document.origin, line, result.description()));
   }
+  const pugi::xml_node root = parsed.child("scene");
+  if (!root) {
+    throw BadData(fmt::format("{}:1: no <scene> in it", document.origin));
+  }
+  read(root);
 }
 
-void ReadScene(Document& document, const pugi::xml_node& root) {
-  CheckCount(document, root, "sensor");
-  CheckCount(document, root, "integrator");
-  if (!root.child("sensor")) {
-    throw document.ErrorAt(root, "a scene needs a <sensor>");
-  }
+void ReadChildren(Document& document, const pugi::xml_node& root) {
   for (const pugi::xml_node& node : root.children()) {
     if (node.type() == pugi::node_element) {
       ReadTopLevel(document, node);
     }
+  }
+}
+
+// What is in the other file, as if it stood here. Its paths start at the same folder.
+void ReadInclude(Document& document, const pugi::xml_node& node) {
+  const std::filesystem::path path = std::filesystem::weakly_canonical(
+      document.File(node, document.RequiredAttribute(node, "filename")));
+  if (std::find(document.included.begin(), document.included.end(), path) !=
+      document.included.end()) {
+    throw document.ErrorAt(node,
+                           fmt::format("'{}' includes itself, over {} files",
+                                       path.filename().string(),
+                                       document.included.size()));
+  }
+  if (document.included.size() >= kMaxIncludes) {
+    throw document.ErrorAt(
+        node, fmt::format("more than {} files included one in another", kMaxIncludes));
+  }
+  std::string text = ReadFile(path, kMaxSceneBytes);
+  document.included.push_back(path);
+  std::string origin = path.string();
+  std::swap(document.text, text);
+  std::swap(document.origin, origin);
+  ReadText(document, [&](const pugi::xml_node& root) { ReadChildren(document, root); });
+  std::swap(document.text, text);
+  std::swap(document.origin, origin);
+  document.included.pop_back();
+}
+
+void ReadScene(Document& document, const pugi::xml_node& root) {
+  ReadChildren(document, root);
+  if (!document.has_sensor) {
+    throw document.ErrorAt(root, "a scene needs a <sensor>");
   }
   Scene& scene = document.scene;
   bool light = !scene.lights.empty();
@@ -96,26 +157,11 @@ Scene ParseScene(const std::string& xml,
   document.origin = origin;
   document.text = xml;
   document.folder = folder;
+  document.included = {std::filesystem::weakly_canonical(origin)};
   document.lenient = options.lenient;
   document.defines = options.defines;
   document.scene.origin = origin;
-
-  pugi::xml_document parsed;
-  const pugi::xml_parse_result result = parsed.load_buffer(
-      xml.data(), xml.size(), pugi::parse_default, pugi::encoding_utf8);
-  if (!result) {
-    const auto offset =
-        std::clamp<std::ptrdiff_t>(result.offset, 0, std::ssize(document.text));
-    const auto line =
-        1 + std::count(document.text.begin(), document.text.begin() + offset, '\n');
-    throw BadData(
-        fmt::format("{}:{}: not XML: {}", origin, line, result.description()));
-  }
-  const pugi::xml_node root = parsed.child("scene");
-  if (!root) {
-    throw BadData(fmt::format("{}:1: no <scene> in it", origin));
-  }
-  ReadScene(document, root);
+  ReadText(document, [&](const pugi::xml_node& root) { ReadScene(document, root); });
   return std::move(document.scene);
 }
 

@@ -15,6 +15,12 @@ void TransformMesh(TriangleMesh& mesh, const Transform& to_world) {
   for (Vec3& n : mesh.normals) {
     n = to_world.Normal(n);
   }
+  if (to_world.Determinant() < 0) {
+    // Mirroring reverses the winding; the normals are right already.
+    for (auto& triangle : mesh.triangles) {
+      std::swap(triangle[1], triangle[2]);
+    }
+  }
 }
 
 void TurnInsideOut(TriangleMesh& mesh) {
@@ -51,12 +57,6 @@ TriangleMesh ReadMesh(Element& element, const std::string& type) {
                       : type == "cube"    ? MakeCube()
                                           : ReadMeshFile(element, type);
   TransformMesh(mesh, to_world);
-  if (to_world.Determinant() < 0) {
-    // Mirroring reverses the winding; the normals are right already.
-    for (auto& triangle : mesh.triangles) {
-      std::swap(triangle[1], triangle[2]);
-    }
-  }
   if (element.Boolean("flipNormals", false)) {
     TurnInsideOut(mesh);
   }
@@ -69,11 +69,12 @@ TriangleMesh ReadMesh(Element& element, const std::string& type) {
   return mesh;
 }
 
-Sphere ReadSphere(Element& element) {
-  const Transform to_world = element.ToWorld();
-  const Vec3 x = to_world.Vector({1, 0, 0});
-  const Vec3 y = to_world.Vector({0, 1, 0});
-  const Vec3 z = to_world.Vector({0, 0, 1});
+Sphere TransformSphere(const Element& element,
+                       const Sphere& sphere,
+                       const Transform& to_world) {
+  const Vec3 x = to_world.Vector(sphere.axes.ToWorld({1, 0, 0}));
+  const Vec3 y = to_world.Vector(sphere.axes.ToWorld({0, 1, 0}));
+  const Vec3 z = to_world.Vector(sphere.axes.ToWorld({0, 0, 1}));
   const float scale = Length(x);
   const float shear = std::abs(Dot(x, y)) + std::abs(Dot(y, z)) + std::abs(Dot(z, x));
   if (!(scale > 0) ||
@@ -83,14 +84,21 @@ Sphere ReadSphere(Element& element) {
                    "a sphere can only be moved, turned and scaled evenly; use a mesh "
                    "for an ellipsoid");
   }
+  Sphere moved = sphere;
+  moved.center = to_world.Point(sphere.center);
+  moved.radius = scale * sphere.radius;
+  moved.axes = Frame(x / scale, y / scale, z / scale);
+  return moved;
+}
+
+Sphere ReadSphere(Element& element) {
+  const Transform to_world = element.ToWorld();
   Sphere sphere;
-  sphere.center = to_world.Point(element.Point("center", {0, 0, 0}));
-  sphere.radius =
-      scale * static_cast<float>(
-                  InRange(element, "radius", element.Float("radius", 1), {1e-9, 1e9}));
+  sphere.center = element.Point("center", {0, 0, 0});
+  sphere.radius = static_cast<float>(
+      InRange(element, "radius", element.Float("radius", 1), {1e-9, 1e9}));
   sphere.inward = element.Boolean("flipNormals", false);
-  sphere.axes = Frame(x / scale, y / scale, z / scale);
-  return sphere;
+  return TransformSphere(element, sphere, to_world);
 }
 
 BsdfPtr ReadShapeBsdf(Element& element) {
@@ -121,13 +129,23 @@ void ReadAreaEmitter(Element emitter, Shape& shape) {
 
 }  // namespace
 
-void ReadShape(Element element) {
+Shape Transformed(const Element& element, Shape shape, const Transform& to_world) {
+  if (auto* const mesh = std::get_if<TriangleMesh>(&shape.geometry)) {
+    TransformMesh(*mesh, to_world);
+  } else {
+    auto& sphere = std::get<Sphere>(shape.geometry);
+    sphere = TransformSphere(element, sphere, to_world);
+  }
+  return shape;
+}
+
+std::optional<Shape> MakeShape(Element element) {
   const std::string type = element.type();
   const std::vector<std::string> known = {
-      "obj", "ply", "sphere", "rectangle", "disk", "cube"};
-  if (std::find(known.begin(), known.end(), type) == known.end()) {
+      "obj", "ply", "sphere", "rectangle", "disk", "cube", "shapegroup", "instance"};
+  if (std::find(known.begin(), known.end() - 2, type) == known.end() - 2) {
     UnknownPlugin(element, known);
-    return;
+    return std::nullopt;
   }
   Shape shape;
   shape.name = element.id().empty() ? type : element.id();
@@ -153,7 +171,17 @@ void ReadShape(Element element) {
     shape.bsdf = MakeDiffuse(MakeConstant({0.5F, 0.5F, 0.5F}));
   }
   element.Finish();
-  element.document().scene.shapes.push_back(std::move(shape));
+  return shape;
+}
+
+void ReadShape(Element element) {
+  if (element.type() == "shapegroup") {
+    ReadShapeGroup(element);
+  } else if (element.type() == "instance") {
+    ReadInstance(element);
+  } else if (std::optional<Shape> shape = MakeShape(element)) {
+    element.document().scene.shapes.push_back(std::move(*shape));
+  }
 }
 
 }  // namespace nacre::render

@@ -233,6 +233,89 @@ TEST(BsdfTest, DielectricRefractsBySnellAndKeepsRadianceOverIndexSquared) {
   EXPECT_NEAR(total.wi.z, -0.6F, 1e-6);
 }
 
+// Over both sides: flux is kept by Sample (weights undone by η² where light refracts),
+// follows its density, and crosses both ways alike: f(a → b) / η_b² is symmetric.
+class RoughGlassTest : public testing::TestWithParam<Microfacet> {
+ protected:
+  static constexpr float kEta = 1.5F;
+  BsdfPtr glass_ = MakeRoughDielectric({kEta, Grey(1), Grey(1)}, GetParam());
+};
+
+TEST_P(RoughGlassTest, KeepsFlux) {
+  for (const float cosine : {0.999F, 0.6F, 0.2F, -0.2F, -0.6F, -0.999F}) {
+    const Vec3 wo = DirectionOf(cosine);
+    RandomStream random(7, 2);
+    constexpr int kCount = 60000;
+    double sum = 0;
+    double sum2 = 0;
+    for (int i = 0; i < kCount; ++i) {
+      const float u_lobe = random.UniformFloat();
+      const float x = random.UniformFloat();
+      const BsdfSample s = glass_->Sample(wo, {}, u_lobe, {x, random.UniformFloat()});
+      const double w = s.pdf > 0 ? static_cast<double>(s.weight.y * s.eta * s.eta) : 0;
+      sum += w;
+      sum2 += w * w;
+    }
+    const double mean = sum / kCount;
+    const double error = std::sqrt(std::max(0.0, sum2 / kCount - mean * mean) / kCount);
+    EXPECT_NEAR(mean, 1, 4 * error + 2e-3) << cosine;
+  }
+}
+
+TEST_P(RoughGlassTest, DirectionsFollowTheirDensity) {
+  for (const float cosine : {0.7F, -0.9F}) {
+    const Vec3 wo = DirectionOf(cosine);
+    // Of directions by Sample, and by uniform directions weighted with the density: the
+    // share in each octant.
+    std::array<double, 8> drawn{};
+    std::array<double, 8> expected{};
+    std::array<double, 8> squares{};
+    RandomStream random(8, 2);
+    constexpr int kCount = 400000;
+    const auto octant = [](Vec3 w) {
+      return static_cast<std::size_t>((w.x > 0) + 2 * (w.y > 0) + 4 * (w.z > 0));
+    };
+    for (int i = 0; i < kCount; ++i) {
+      const float u_lobe = random.UniformFloat();
+      const float x = random.UniformFloat();
+      const Vec2 u{x, random.UniformFloat()};
+      const BsdfSample s = glass_->Sample(wo, {}, u_lobe, u);
+      if (s.pdf > 0) {
+        drawn[octant(s.wi)] += 1.0 / kCount;
+      }
+      const Vec3 wi = SquareToSphere(u);
+      const double share =
+          static_cast<double>(glass_->Evaluate(wo, wi, {}).pdf) * 4 * std::numbers::pi;
+      expected[octant(wi)] += share / kCount;
+      squares[octant(wi)] += share * share / kCount;
+    }
+    for (std::size_t k = 0; k < 8; ++k) {
+      EXPECT_NEAR(drawn[k], expected[k], 4 * std::sqrt(squares[k] / kCount) + 1e-3)
+          << cosine << ", octant " << k;
+    }
+  }
+}
+
+TEST_P(RoughGlassTest, IsReciprocal) {
+  const Vec3 above = Normalized(Vec3{0.3F, 0.2F, 0.9F});
+  const Vec3 below = Normalized(Vec3{-0.25F, -0.1F, -0.8F});
+  const Vec3 beside = Normalized(Vec3{-0.4F, 0.1F, 0.5F});
+  const auto f = [&](Vec3 wo, Vec3 wi) {
+    return glass_->Evaluate(wo, wi, {}).value.x / std::abs(wi.z);
+  };
+  EXPECT_GT(f(above, below), 0);
+  // Radiance over η² is what is kept: [Veach97, Eq. 5.14].
+  EXPECT_NEAR(f(above, below) * kEta * kEta, f(below, above), 2e-3F * f(below, above));
+  EXPECT_NEAR(f(above, beside), f(beside, above), 1e-4F * f(above, beside));
+}
+
+INSTANTIATE_TEST_SUITE_P(Facets,
+                         RoughGlassTest,
+                         testing::Values(Microfacet{Microfacet::Kind::kGgx, 0.3F},
+                                         Microfacet{Microfacet::Kind::kGgx, 0.8F},
+                                         Microfacet{Microfacet::Kind::kBeckmann,
+                                                    0.4F}));
+
 TEST(FresnelTest, SinglePrecisionAgreesWithTheDoubleOne) {
   for (const float eta : {1 / 1.5F, 1.0F, 1.3F, 1.5F, 2.4F}) {
     for (float mu = 0.02F; mu <= 1; mu += 0.02F) {

@@ -30,7 +30,7 @@ void ExpectNear(Vec3 a, Vec3 b, float tolerance) {
 TEST(ShapeTest, RaysFindPlaceNormalAndUv) {
   const std::vector<Shape> shapes = {MeshShape(MakeRectangle()),
                                      SphereShape({0, 0, 5}, 2)};
-  const EmbreeScene scene(shapes, 1);
+  const EmbreeScene scene(shapes, {}, 1);
   SurfaceHit hit;
   ASSERT_TRUE(scene.Intersect({{0.5F, -0.25F, 1}, {0, 0, -1}}, hit));
   EXPECT_EQ(hit.shape_index, 0u);
@@ -58,7 +58,7 @@ TEST(ShapeTest, PointsMovedOffTheSurfaceDoNotSeeIt) {
   std::vector<Shape> shapes;
   shapes.push_back(MeshShape(std::move(mesh)));
   shapes.push_back(SphereShape({-4000, 10, 3}, 50));
-  const EmbreeScene scene(shapes, 1);
+  const EmbreeScene scene(shapes, {}, 1);
   for (std::uint32_t i = 0; i < 20000; ++i) {
     Sampler sampler(1, i);
     const AreaSampler area(shapes[i % 2]);
