@@ -6,6 +6,8 @@
 #include "reconstruct/export/psf.h"
 #ifdef NACRE_HAS_FACTOR
 #include "cli/exchange/export_maps.h"
+#include "factor/factor.h"
+#include "factor/sss.h"
 #endif
 
 #include <filesystem>
@@ -35,6 +37,34 @@ int ToPsf(const Arguments& args, const Common& common) {
 }
 
 #ifdef NACRE_HAS_FACTOR
+
+// A material of Gaussian profiles as it is; profiles are fitted to a dataset.
+int ToSss(const Arguments& args, const Common& common) {
+  factor::Material material;
+  if (DetectKind(args.file) == ArtefactKind::kMaterial) {
+    material = factor::ReadMaterial(args.file);
+  } else {
+    constexpr int kGaussians = 4;
+    reconstruct::RdReader reader(args.file);
+    auto fitted = factor::Factor(reader,
+                                 {.method = "profiles",
+                                  .terms = kGaussians,
+                                  .bits = 32,
+                                  .thread_count = common.thread_count,
+                                  .seed = common.seed},
+                                 ConsoleProgress(common));
+    Say(common, "fit: " + fitted.summary.Brief());
+    material = std::move(fitted.material);
+  }
+  const std::int64_t bytes = factor::WriteSss(args.out, material);
+  Say(common, "lost: pitch, refractive index, what lies beyond the grid");
+  Print(
+      common,
+      Json{
+          {"file", args.out.string()}, {"bytes", bytes}, {"gaussians", material.terms}},
+      args.out.string());
+  return 0;
+}
 
 exchange::ProfileFit Fit(const std::filesystem::path& file, const Common& common) {
   const ProgressFunction progress = ConsoleProgress(common);
@@ -72,6 +102,10 @@ int Run(const Arguments& args, const Common& common) {
   }
   std::string known = "psf";
 #ifdef NACRE_HAS_FACTOR
+  if (args.to == "sss") {
+    return ToSss(args, common);
+  }
+  known += ", sss";
   if (const exchange::Target* target = exchange::FindTarget(args.to)) {
     return ToRenderer(*target, args, common);
   }
@@ -86,12 +120,14 @@ int Run(const Arguments& args, const Common& common) {
 
 std::function<int()> MakeExportVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
-  app.add_option("file", args->file, "dataset, *.rd.exr; to renderers also *.nacre.exr")
+  app.add_option(
+         "file", args->file, "dataset, *.rd.exr; to sss and renderers also *.nacre.exr")
       ->required();
-  app.add_option("--to",
-                 args->to,
-                 "psf, or a renderer: cycles, pbrt-v4, mtlx, renderman, appleseed, "
-                 "mitsuba3")
+  app.add_option(
+         "--to",
+         args->to,
+         "psf, sss, or a renderer: cycles, pbrt-v4, mtlx, renderman, appleseed, "
+         "mitsuba3")
       ->required();
   app.add_option("-o,--out", args->out, "file to write; of renderers a folder")
       ->required();

@@ -5,6 +5,9 @@
 #include "reconstruct/import/images.h"
 #include "reconstruct/import/npy.h"
 #include "reconstruct/import/psf.h"
+#ifdef NACRE_HAS_FACTOR
+#include "factor/sss.h"
+#endif
 #ifdef NACRE_HAS_MAT
 #include "reconstruct/import/mat.h"
 #endif
@@ -28,6 +31,28 @@ struct Arguments {
   reconstruct::ArrayImportOptions arrays;
 };
 
+#ifdef NACRE_HAS_FACTOR
+
+// Profiles are a material already; as a dataset they are sampled.
+ImportSummary ImportSss(const Arguments& args, const ProgressFunction& progress) {
+  const factor::Material m = factor::ReadSss(args.file,
+                                             {.pitch_mm = args.options.pitch_mm,
+                                              .eta = args.options.eta,
+                                              .scale = args.options.scale});
+  ImportSummary summary{.points_x = m.points_x,
+                        .points_y = m.points_y,
+                        .core = m.core,
+                        .channel_count = static_cast<int>(m.channels.size())};
+  if (args.out.filename().string().ends_with(".nacre.exr")) {
+    factor::WriteMaterial(args.out, m);
+  } else {
+    summary.invalid_count = factor::WriteSlices(args.out, m, progress);
+  }
+  return summary;
+}
+
+#endif
+
 ImportSummary RunImport(const Arguments& args, const Common& common) {
   const ProgressFunction progress = ConsoleProgress(common);
   if (args.from == "psf") {
@@ -50,7 +75,15 @@ ImportSummary RunImport(const Arguments& args, const Common& common) {
         "--from mat: this build has no libmatio; install it and build again");
 #endif
   }
-  throw UsageError("--from " + args.from + ": not one of psf, images, npy and mat");
+  if (args.from == "sss") {
+#ifdef NACRE_HAS_FACTOR
+    return ImportSss(args, progress);
+#else
+    throw UsageError("--from sss: this build was made without `factor`");
+#endif
+  }
+  throw UsageError("--from " + args.from +
+                   ": not one of psf, sss, images, npy and mat");
 }
 
 int Run(const Arguments& args, const Common& common) {
@@ -75,8 +108,10 @@ int Run(const Arguments& args, const Common& common) {
 std::function<int()> MakeImportVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
   app.add_option("file", args->file, "the file; of images, the folder")->required();
-  app.add_option("--from", args->from, "psf, images, npy or mat")->required();
-  app.add_option("-o,--out", args->out, "dataset to write, *.rd.exr")->required();
+  app.add_option("--from", args->from, "psf, sss, images, npy or mat")->required();
+  app.add_option(
+         "-o,--out", args->out, "dataset to write, *.rd.exr; of sss also *.nacre.exr")
+      ->required();
   AddOptions(app, args->options);
   app.get_option("--pitch-mm")->required();
   AddOptions(app, args->images);

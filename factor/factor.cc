@@ -32,6 +32,10 @@ std::int64_t WorkingBytes(const reconstruct::RdHeader& header,
       options.method == "bilinear" ? internal::PairBytes(header)
       : options.method == "reciprocal"
           ? internal::ReciprocalBytes(header, internal::LimitsOf(options))
+      : options.method == "profiles"
+          ? 8 * static_cast<double>(header.PointCount()) * channels * options.terms
+      : options.method == "tucker"
+          ? 16 * window * window + 24 * window * internal::kBlockRows
           : 8 * window * window * channels * options.clusters;
   const double bytes = method_bytes +
                        (8 + 5) * window * channels * internal::kBlockRows +
@@ -102,7 +106,10 @@ const std::vector<std::pair<std::string, MakeMethod>>& Methods() {
       {"log-svd", internal::MakeSvdMethod},
       {"svd", internal::MakeSvdMethod},
       {"sqrt-svd", internal::MakeSvdMethod},
+      {"tucker", internal::MakeTuckerMethod},
       {"nmf", internal::MakeNmfMethod},
+      {"profiles", internal::MakeProfilesMethod},
+      {"gaussian", internal::MakeProfilesMethod},
       {"bilinear", internal::MakeBilinearMethod},
       {"reciprocal", internal::MakeReciprocalMethod}};
   return methods;

@@ -25,6 +25,8 @@ struct FactorOptions {
   int fill_rounds = 2;
   double bits = 0;
   double tail_weight = 1;
+  int polynomial = 3;
+  int window_rank = 1;
   int taps = 3;
   double totals = 0.01;
   double memory_mb = 1000;
@@ -37,7 +39,8 @@ struct FactorOptions {
     visit("method",
           self.method,
           Range{},
-          "log-svd, svd, sqrt-svd, nmf, bilinear or reciprocal");
+          "log-svd, svd, sqrt-svd, tucker, nmf, profiles (or gaussian), bilinear or "
+          "reciprocal");
     visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
     visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
     visit("bytes",
@@ -70,6 +73,14 @@ struct FactorOptions {
           Range{0, 2},
           "of bilinear, nmf and reciprocal: 0 minimises the error in R_d, 1 that over "
           "the root of R_d, 2 that over R_d");
+    visit("polynomial",
+          self.polynomial,
+          Range{0, 8},
+          "of tucker: order P of what makes a channel of the mean of all");
+    visit("window_rank",
+          self.window_rank,
+          Range{0, 255},
+          "of tucker: rank of a kernel along the window's sides; 0: any");
     visit("taps",
           self.taps,
           Range{1, 4},

@@ -2,8 +2,10 @@
 
 #include "core/error.h"
 #include "factor/internal/bilinear.h"
+#include "factor/internal/profiles.h"
 #include "factor/internal/reciprocal.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "factor/internal/tucker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -77,6 +79,10 @@ const char* Name(Form form) {
       return "bilinear";
     case Form::kReciprocal:
       return "reciprocal";
+    case Form::kTucker:
+      return "tucker";
+    case Form::kProfiles:
+      return "profiles";
     case Form::kSum:
       break;
   }
@@ -89,6 +95,8 @@ int Material::KernelCount() const {
       return terms * (terms + 1) / 2;
     case Form::kReciprocal:
       return internal::ReciprocalKernelCount(terms, taps);
+    case Form::kTucker:
+    case Form::kProfiles:
     case Form::kSum:
       break;
   }
@@ -105,6 +113,12 @@ float Material::Evaluate(int channel, int i, int j, int u, int v) const {
       row_scale[static_cast<std::size_t>(channel * PointCount() + point)];
   if (form == Form::kBilinear) {
     return scale * internal::BilinearCell(*this, channel, {i, j}, {u, v});
+  }
+  if (form == Form::kTucker) {
+    return scale * internal::TuckerCell(*this, channel, {i, j}, {u, v});
+  }
+  if (form == Form::kProfiles) {
+    return scale * internal::ProfilesCell(*this, channel, {i, j}, {u, v});
   }
   const std::int64_t cell = std::int64_t{v} * core + u;
   const int k = cluster.empty() ? 0 : cluster[static_cast<std::size_t>(point)];
@@ -142,6 +156,14 @@ void Material::EvaluateTerms(
   }
   if (form == Form::kReciprocal) {
     internal::ReciprocalWindows(*this, {i, j}, channel, 1, window);
+    return;
+  }
+  if (form == Form::kTucker) {
+    internal::TuckerWindow(*this, channel, {i, j}, window);
+    return;
+  }
+  if (form == Form::kProfiles) {
+    internal::ProfilesWindow(*this, channel, {i, j}, window);
     return;
   }
   const std::int64_t point = std::int64_t{j} * points_x + i;
@@ -193,17 +215,19 @@ void Validate(const Material& m, const std::string& origin) {
       m.taps >= 1 && m.taps <= internal::kMostTaps, "taps", fmt::format("{}", m.taps));
   if (m.form != Form::kSum) {
     check.Require(
-        m.cluster_count == 1, "cluster_count", "a model with shared maps has one");
+        m.cluster_count == 1, "cluster_count", "only sums have more than one");
     check.Require(m.transform == Transform::kLinear,
                   "transform",
-                  "a model with shared maps has none");
+                  "only sums have another than the linear one");
   }
-  const std::int64_t maps = std::int64_t{m.MapSets()} * m.terms;
-  const std::int64_t kernels = channels * m.cluster_count * m.KernelCount();
+  check.Require(m.order >= 0 && m.order <= 8, "order", fmt::format("{}", m.order));
+  const std::int64_t maps = std::int64_t{m.MapSets()} * m.MapCount();
+  const std::int64_t kernels =
+      std::int64_t{m.KernelSets()} * m.cluster_count * m.KernelCount();
   check.Size(m.f, maps * m.MapSize(), "f");
   check.Size(m.h, kernels * m.KernelSize(), "h");
   check.Size(m.steps.f, m.steps.empty() ? 0 : maps, "steps of f");
-  check.Size(m.steps.h, m.steps.empty() ? 0 : channels, "steps of h");
+  check.Size(m.steps.h, m.steps.empty() ? 0 : m.KernelSets(), "steps of h");
   if (!m.steps.empty()) {
     std::for_each(m.steps.f.begin(), m.steps.f.end(), [&](float step) {
       positive(static_cast<double>(step), "step of f");
@@ -221,6 +245,22 @@ void Validate(const Material& m, const std::string& origin) {
   check.Values(m.h, kAny, "h");
   check.Values(m.row_scale, 0, "row_scale");
   check.Values(m.albedo, 0, "albedo");
+  if (m.form == Form::kTucker) {
+    const float* shift = m.FactorMap(0, internal::TuckerShiftMap(m));
+    for (std::int64_t n = 0; n < m.MapSize(); ++n) {
+      check.Require(
+          shift[n] >= 0 && shift[n] < static_cast<float>(m.WindowSize()) &&
+              shift[n] == std::floor(shift[n]),
+          "shift",
+          fmt::format("{} of point {} is no cell of the window", shift[n], n));
+    }
+  }
+  if (m.form == Form::kProfiles) {
+    check.Values(m.f, 0, "f");
+    std::for_each(m.h.begin(), m.h.end(), [&](float log_beta) {
+      check.Require(std::abs(log_beta) <= 60, "ln beta", fmt::format("{}", log_beta));
+    });
+  }
   for (std::size_t n = 0; n < m.cluster.size(); ++n) {
     check.Require(
         m.cluster[n] < m.cluster_count,

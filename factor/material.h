@@ -31,6 +31,8 @@ enum class Form {
   kBilinear,    ///< Σ_jk f_j(x_i) h_jk(d) f_k(x_o), maps shared by all channels
   kReciprocal,  ///< A exp of a symmetric polynomial of the maps at both ends and in
                 ///< between, maps shared by all channels
+  kTucker,      ///< a polynomial in Σ_t f_t(x_i) h_t(shifted d), coefficients a point
+  kProfiles,    ///< √(P(x_i) P(x_o)), P a sum of Gaussians with maps as weights
 };
 
 const char* Name(Form form);
@@ -39,22 +41,24 @@ const char* Name(Form form);
 /// (and 0): any float.
 struct Steps {
   std::vector<float> f;  ///< a map, in the order of Material::f
-  std::vector<float> h;  ///< a channel
+  std::vector<float> h;  ///< a channel (kTucker: one for all)
   float row_scale = 0;
   bool empty() const { return f.empty(); }
   friend bool operator==(const Steps&, const Steps&) = default;
 };
 
-/// A factored dataset. R'_d(x_i, d) of channel c is, for the three forms,
+/// A factored dataset. R'_d(x_i, d) of channel c is, for the five forms,
 ///   row_scale_c(x_i) · max(0, T_c(Σ_j f_cj(x_i) h_ckj(d))),  k = cluster(x_i),
 ///   max(0, Σ_jk f_j(x_i) h_cjk(d) f_k(x_o)),  h_cjk(d) = h_ckj(−d),  x_o = x_i + d.
 ///   row_scale_c(x_i) row_scale_c(x_o) A_c exp(h_c0(d) + Σ_j Σ_t h_cjt(d) φ_t[f_j]
 ///     + Σ_{j ≤ k} h_cjk(d) (f_j(x_i) f_k(x_o) + f_k(x_i) f_j(x_o))),  h(−d) = h(d),
+///   row_scale_c(x_i) max(0, Σ_{p ≤ P} a_cp(x_i) (Σ_t f_t(x_i) h_t(d − shift(x_i)))^p),
+///   √(P_c(x_i) P_c(x_o)),  P_c(x) = Σ_t f_ct(x) β_ct/2π exp(−β_ct |d|²/2),
 /// with taps φ_0[f] = f(x_i) + f(x_o), φ_1[f] = 2 f(middle), φ_2[f] the sum of f at the
 /// quarters of the way, φ_3[f] half of that at its odd eighths, the exponent being cut
-/// at ln 3. The last two are
-/// reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d); the last is positive.
-/// Indices, units and orientation are those of reconstruct::RdHeader.
+/// at ln 3; d − shift goes around the window's edges. Bilinear, reciprocal and profiles
+/// are reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d); reciprocal is
+/// positive. Indices, units and orientation are those of reconstruct::RdHeader.
 struct Material {
   int points_x = 0;
   int points_y = 0;
@@ -69,18 +73,21 @@ struct Material {
   int cluster_count = 1;
   int margin = 0;  ///< shared maps go on for so many points beyond the grid
   int taps = 1;    ///< 1 to 4 (kReciprocal)
+  int order = 0;   ///< P, 0 to 8 (kTucker)
 
   std::vector<double> a;  ///< A a channel (kLog, kReciprocal)
   std::vector<double> b;  ///< B a channel (kLog)
-  /// [channel][term][j][i]; shared: [term][j][i], with margin on all sides.
+  /// [channel][term][j][i]; shared: [term][j][i], with margin on all sides; kTucker:
+  /// f_t, then a_cp [channel][power], then the number of the cell that rows begin at.
   std::vector<float> f;
   /// [channel][cluster][term][v][u]; kBilinear: [channel][pair][v][u], pairs being
   /// (0, 0), (0, 1), …, (1, 1), (1, 2), …; kReciprocal: [channel][kernel][v][u], the
-  /// constant, then [tap][term], then pairs, of rows up to the middle one.
+  /// constant, then [tap][term], then pairs, of rows up to the middle one; kTucker:
+  /// [term][v][u]; kProfiles: [channel][term], ln β, β in mm⁻².
   std::vector<float> h;
   std::vector<std::uint8_t> cluster;  ///< [j][i], all 0 without clustering
   std::vector<float> row_scale;  ///< [channel][j][i]; makes each slice's total exact
-                                 ///< (kBilinear: 1 everywhere)
+                                 ///< (kBilinear, kProfiles: 1 everywhere)
   std::vector<float> albedo;  ///< [channel][j][i]: Σ_d R_d · pitch², dimensionless
   Steps steps;
   std::map<std::string, double>
@@ -94,22 +101,37 @@ struct Material {
   int MapHeight() const { return points_y + 2 * margin; }
   std::int64_t MapSize() const { return std::int64_t{MapWidth()} * MapHeight(); }
   /// Sets of factor maps: one a channel, or one for all.
-  int MapSets() const {
-    return form == Form::kSum ? static_cast<int>(channels.size()) : 1;
+  int MapSets() const { return SharesMaps() ? 1 : static_cast<int>(channels.size()); }
+  bool SharesMaps() const { return form != Form::kSum && form != Form::kProfiles; }
+  /// Maps of a set: one a term, but for kTucker.
+  int MapCount() const {
+    return form == Form::kTucker
+               ? terms + static_cast<int>(channels.size()) * (order + 1) + 1
+               : terms;
   }
+  /// Sets of kernels: one a channel, or one for all.
+  int KernelSets() const {
+    return form == Form::kTucker ? 1 : static_cast<int>(channels.size());
+  }
+  /// Whether row_scale makes the totals of slices exact.
+  bool KeepsTotals() const { return form == Form::kSum || form == Form::kTucker; }
   /// Kernels of a channel and cluster.
   int KernelCount() const;
   /// Values of a kernel: those of a window, or of its rows up to the middle one.
   std::int64_t KernelSize() const {
-    return std::int64_t{core} * (form == Form::kReciprocal ? (core + 1) / 2 : core);
+    return std::int64_t{KernelWidth()} *
+           (form == Form::kReciprocal ? (core + 1) / 2 : KernelWidth());
   }
+  int KernelWidth() const { return form == Form::kProfiles ? 1 : core; }
   const float* FactorMap(int channel, int term) const {
     const int set = MapSets() == 1 ? 0 : channel;
-    return &f[static_cast<std::size_t>((std::int64_t{set} * terms + term) * MapSize())];
+    return &f[static_cast<std::size_t>((std::int64_t{set} * MapCount() + term) *
+                                       MapSize())];
   }
   const float* Kernel(int channel, int cluster_index, int n) const {
+    const int set = KernelSets() == 1 ? 0 : channel;
     return &h[static_cast<std::size_t>(
-        ((std::int64_t{channel} * cluster_count + cluster_index) * KernelCount() + n) *
+        ((std::int64_t{set} * cluster_count + cluster_index) * KernelCount() + n) *
         KernelSize())];
   }
 

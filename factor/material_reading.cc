@@ -72,13 +72,19 @@ class AttributeReader {
 
 Form ParseForm(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("form");
-  for (const Form form : {Form::kSum, Form::kBilinear, Form::kReciprocal}) {
+  for (const Form form : {Form::kSum,
+                          Form::kBilinear,
+                          Form::kReciprocal,
+                          Form::kTucker,
+                          Form::kProfiles}) {
     if (text == Name(form)) {
       return form;
     }
   }
   throw attributes.At("form",
-                      "is '" + text + "', none of 'sum', 'bilinear', 'reciprocal'");
+                      "is '" + text +
+                          "', none of 'sum', 'bilinear', 'reciprocal', 'tucker', "
+                          "'profiles'");
 }
 
 Transform ParseTransform(const AttributeReader& attributes) {
@@ -143,8 +149,16 @@ Material ReadAttributes(const AttributeReader& attributes) {
       throw attributes.At("terms", "is " + attributes.Text("terms") + ", out of range");
     }
   }
-  if (attributes.Text("version") == internal::kVersion) {
+  const std::string& version = attributes.Text("version");
+  if (version == internal::kVersion || version == internal::kVersionWithoutOrder) {
     m.taps = attributes.Integer("taps");
+  }
+  if (version == internal::kVersion) {
+    const double order = attributes.Number("order");
+    if (!(order >= 0 && order <= 8 && order == std::floor(order))) {
+      throw attributes.At("order", "is " + attributes.Text("order") + ", not 0 to 8");
+    }
+    m.order = static_cast<int>(order);
   }
   m.provenance = attributes.Text("provenance");
   const Json channels = attributes.List("channels");
@@ -216,9 +230,7 @@ std::vector<T> FromPart(const std::vector<ExrPart>& parts,
 }
 
 // Values where the file holds whole numbers; `m` comes with these.
-void ReadSteps(const AttributeReader& attributes,
-               const std::string& origin,
-               Material& m) {
+void ReadSteps(const AttributeReader& attributes, Material& m) {
   const Json json = attributes.List("steps");
   for (const char* key : {"f", "f_least", "h", "h_least", "row_scale"}) {
     if (!json.contains(key)) {
@@ -231,7 +243,19 @@ void ReadSteps(const AttributeReader& attributes,
     }
   }
   m.steps.row_scale = static_cast<float>(attributes.Parse("steps", json["row_scale"]));
-  Validate(m, origin);  // a step for each map and channel, before they are used
+  // A step for each map and set of kernels, before they are used.
+  const auto require = [&](const char* of, std::int64_t found, std::int64_t expected) {
+    if (found != expected) {
+      throw attributes.At("steps",
+                          fmt::format("has as steps of {}: {} values where {} are "
+                                      "expected",
+                                      of,
+                                      found,
+                                      expected));
+    }
+  };
+  require("f", std::ssize(m.steps.f), std::int64_t{m.MapSets()} * m.MapCount());
+  require("h", std::ssize(m.steps.h), m.KernelSets());
   internal::Decode(attributes.Parse("steps", json["f_least"]),
                    attributes.Parse("steps", json["h_least"]),
                    m);
@@ -250,8 +274,8 @@ Material ReadMaterial(const std::filesystem::path& path) {
   }
   const AttributeReader attributes(found, path.string());
   const std::string& version = attributes.Text("version");
-  if (version != internal::kVersion && version != internal::kVersionWithoutTaps &&
-      version != internal::kOldVersion) {
+  if (version != internal::kVersion && version != internal::kVersionWithoutOrder &&
+      version != internal::kVersionWithoutTaps && version != internal::kOldVersion) {
     throw attributes.At("version",
                         "is " + version + "; this build reads " +
                             internal::kOldVersion + " to " + internal::kVersion +
@@ -263,11 +287,12 @@ Material ReadMaterial(const std::filesystem::path& path) {
   m.row_scale = FromPart<float>(parts, "row_scale", layout.points, m.channels, path);
   m.f =
       FromPart<float>(parts, "factors", layout.factors, internal::MapChannels(m), path);
-  m.h = FromPart<float>(parts, "kernels", layout.kernels, m.channels, path);
+  m.h = FromPart<float>(
+      parts, "kernels", layout.kernels, internal::KernelChannels(m), path);
   m.cluster = FromPart<std::uint8_t>(
       parts, "cluster", layout.cluster, internal::SharedChannel(), path);
   if (found.contains("nacre.steps")) {
-    ReadSteps(attributes, path.string(), m);
+    ReadSteps(attributes, m);
   }
   Validate(m, path.string());
   if (attributes.Text("checksum") != internal::Checksum(found, parts)) {

@@ -63,6 +63,7 @@ ExrAttributes AttributesOf(const Material& m) {
           {"nacre.form", Name(m.form)},
           {"nacre.margin", std::to_string(m.margin)},
           {"nacre.taps", std::to_string(m.taps)},
+          {"nacre.order", std::to_string(m.order)},
           {"nacre.transform", Name(m.transform)},
           {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},
           {"nacre.core", std::to_string(m.core)},
@@ -138,7 +139,8 @@ std::vector<ExrPart> ToParts(const Material& m) {
       ToPart(
           "row_scale", layout.points, m.channels, values(m.row_scale, codes.row_scale)),
       ToPart("factors", layout.factors, internal::MapChannels(m), values(m.f, codes.f)),
-      ToPart("kernels", layout.kernels, m.channels, values(m.h, codes.h)),
+      ToPart(
+          "kernels", layout.kernels, internal::KernelChannels(m), values(m.h, codes.h)),
       ToPart("cluster", layout.cluster, internal::SharedChannel(), m.cluster)};
   for (ExrPart& part : parts) {
     OrderChannels(part);

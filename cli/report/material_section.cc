@@ -125,7 +125,7 @@ std::string Sheet(const std::vector<std::string>& rows,
 // the constant, then "1" for the ends' taps, "1′", "1″" for those in between, then
 // pairs.
 std::string KernelName(const Material& m, int n) {
-  if (m.form == factor::Form::kSum) {
+  if (m.form != factor::Form::kBilinear && m.form != factor::Form::kReciprocal) {
     return std::to_string(n + 1);
   }
   if (m.form == factor::Form::kReciprocal) {
@@ -157,18 +157,18 @@ std::string FirstOf(int count) {
 std::string SheetFigures(const Material& m) {
   const auto kernel_size = static_cast<std::size_t>(m.KernelSize());
   const auto map_size = static_cast<std::size_t>(m.MapSize());
-  const bool is_sum = m.form == factor::Form::kSum;
+  const bool is_sum = m.form == factor::Form::kSum || m.form == factor::Form::kTucker;
   const std::string kernels = Sheet(
-      m.channels,
+      m.KernelSets() == 1 ? std::vector<std::string>{"all"} : m.channels,
       m.KernelCount(),
       [&](int n) { return "<i>h</i><sub>" + KernelName(m, n) + "</sub>"; },
       [&](int c, int n) {
-        return Plane{m.core,
-                     static_cast<int>(m.KernelSize() / m.core),
+        return Plane{m.KernelWidth(),
+                     static_cast<int>(m.KernelSize() / m.KernelWidth()),
                      {m.Kernel(c, 0, n), kernel_size}};
       });
   const std::string maps = Sheet(
-      is_sum ? m.channels : std::vector<std::string>{"all"},
+      m.SharesMaps() ? std::vector<std::string>{"all"} : m.channels,
       m.terms,
       [](int n) { return fmt::format("<i>f</i><sub>{}</sub>", n + 1); },
       [&](int c, int n) {
@@ -191,8 +191,8 @@ std::string SheetFigures(const Material& m) {
          Figure(maps,
                 fmt::format("Factor maps f<sub>j</sub>: {}; mean square 1 over the "
                             "sample.{}{}",
-                            is_sum ? "how much of each kernel is at each point"
-                                   : "one set for all channels",
+                            m.SharesMaps() ? "one set for all channels"
+                                           : "how much of each kernel is at each point",
                             FirstOf(m.terms),
                             beyond));
 }
@@ -214,6 +214,18 @@ std::string TransformTable(const Material& m) {
            "and "
            "the same from x<sub>i</sub> to x<sub>o</sub> and back, to the last "
            "bit.</p>";
+  }
+  if (m.form == factor::Form::kTucker) {
+    return "<p>R<sub>d</sub> = Σ<sub>p</sub> a<sub>p</sub>(x<sub>i</sub>) "
+           "(Σ<sub>t</sub> f<sub>t</sub>(x<sub>i</sub>) h<sub>t</sub>(d − shift))"
+           "<sup>p</sup>: slices shifted so that their maximum comes first, a "
+           "polynomial of their mean over the channels for each channel.</p>";
+  }
+  if (m.form == factor::Form::kProfiles) {
+    return "<p>R<sub>d</sub> = √(P(x<sub>i</sub>) P(x<sub>o</sub>)), P a sum of "
+           "Gaussians of the distance, one map of weights each; kernels are ln β, β in "
+           "mm<sup>−2</sup>: the same from x<sub>i</sub> to x<sub>o</sub> and "
+           "back.</p>";
   }
   if (m.transform != factor::Transform::kLog) {
     return "<p>R<sub>d</sub> = Σ<sub>j</sub> f<sub>j</sub> h<sub>j</sub>, a channel at "

@@ -10,20 +10,27 @@ const std::vector<std::string>& SharedChannel() {
 }
 
 const std::vector<std::string>& MapChannels(const Material& m) {
-  return m.form == Form::kSum ? m.channels : SharedChannel();
+  return m.SharesMaps() ? SharedChannel() : m.channels;
+}
+
+const std::vector<std::string>& KernelChannels(const Material& m) {
+  return m.form == Form::kTucker ? SharedChannel() : m.channels;
 }
 
 Layout LayoutOf(const Material& m) {
   const std::size_t n = m.channels.size();
-  return {
-      {m.points_x, m.points_y, 1, 1, n},
-      {m.MapWidth(), m.MapHeight(), m.terms, 1, static_cast<std::size_t>(m.MapSets())},
-      {m.core,
-       static_cast<int>(m.KernelSize() / m.core),
-       m.KernelCount(),
-       m.cluster_count,
-       n},
-      {m.points_x, m.points_y, 1, 1, 1}};
+  return {{m.points_x, m.points_y, 1, 1, n},
+          {m.MapWidth(),
+           m.MapHeight(),
+           m.MapCount(),
+           1,
+           static_cast<std::size_t>(m.MapSets())},
+          {m.KernelWidth(),
+           static_cast<int>(m.KernelSize() / m.KernelWidth()),
+           m.KernelCount(),
+           m.cluster_count,
+           static_cast<std::size_t>(m.KernelSets())},
+          {m.points_x, m.points_y, 1, 1, 1}};
 }
 
 std::string Checksum(const ExrAttributes& attributes,

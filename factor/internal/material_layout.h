@@ -6,7 +6,8 @@
 ///   row_scale  points_x × points_y
 ///   factors    (terms · map width) × map height        maps f_j side by side
 ///   kernels    (kernels · core) × (clusters · core)    kernels h_j, a cluster a row
-///              (reciprocal: (core + 1) / 2 rows, the rest being their mirror image)
+///              (reciprocal: (core + 1) / 2 rows, the rest being their mirror image;
+///              profiles: a pixel a kernel)
 ///   cluster    points_x × points_y, channel Y
 /// Where the material has steps, values are whole numbers instead, times a step. Maps
 /// that all channels share are channel Y.
@@ -21,7 +22,9 @@
 namespace nacre::factor::internal {
 
 inline constexpr const char* kFormat = "material";
-inline constexpr const char* kVersion = "3";
+inline constexpr const char* kVersion = "4";
+/// Without tucker and profiles.
+inline constexpr const char* kVersionWithoutOrder = "3";
 /// Without taps and the form they are of.
 inline constexpr const char* kVersionWithoutTaps = "2";
 /// Sums of floats: no form, margin or steps.
@@ -77,6 +80,9 @@ const std::vector<std::string>& SharedChannel();
 
 /// The channels of the factor maps.
 const std::vector<std::string>& MapChannels(const Material& m);
+
+/// The channels of the kernels.
+const std::vector<std::string>& KernelChannels(const Material& m);
 
 /// Of all attributes and values but itself, in the order of the file.
 std::string Checksum(const ExrAttributes& attributes,

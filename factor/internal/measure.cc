@@ -64,7 +64,7 @@ void ScaleSlice(std::span<const float> rd,
     m.EvaluateTerms(c, index.x, index.y, m.terms, window.data());
   }
   const auto at = static_cast<std::size_t>(std::int64_t{c} * m.PointCount() + point);
-  if (m.form == Form::kSum) {
+  if (m.KeepsTotals()) {
     m.row_scale[at] = RoundScale(TotalScale(rd, valid, window), m.steps.row_scale);
   }
   if (m.form != Form::kReciprocal) {
@@ -163,7 +163,7 @@ FitError SampleError(const Job& job, const Material& m) {
       const std::size_t offset = (r * channels + c) * window;
       const std::span rd(&data.rd[offset], window);
       const std::span valid(&data.valid[offset], window);
-      if (m.form == Form::kSum) {
+      if (m.KeepsTotals()) {
         const auto scale = static_cast<float>(TotalScale(rd, valid, values));
         for (float& value : values) {
           value *= scale;

@@ -55,6 +55,8 @@ std::unique_ptr<Method> MakeSvdMethod(Job& job);
 std::unique_ptr<Method> MakeBilinearMethod(Job& job);
 std::unique_ptr<Method> MakeNmfMethod(Job& job);
 std::unique_ptr<Method> MakeReciprocalMethod(Job& job);
+std::unique_ptr<Method> MakeTuckerMethod(Job& job);
+std::unique_ptr<Method> MakeProfilesMethod(Job& job);
 
 /// Header fields, and row_scale and albedo of the right size.
 Material EmptyMaterial(const reconstruct::RdHeader& header);

@@ -1,8 +1,10 @@
 #include "factor/internal/quantize.h"
 
 #include "core/error.h"
+#include "factor/internal/form_weights.h"
 #include "factor/internal/measure.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "factor/internal/tucker.h"
 
 #include <algorithm>
 #include <cmath>
@@ -17,6 +19,7 @@ constexpr double kMostBits = 16;
 constexpr double kFloatBits = 32;
 constexpr double kKernelFinesse = 32;
 constexpr double kLogKernelFinesse = 4;
+constexpr double kLogBetaStep = 0x1p-16;  // of ln β: 1e-4 of exp(−10)
 constexpr float kMostCode = 0x1p22F;      // either way; floats hold four times as much
 constexpr double kLeastStep = 1e-37;      // floats lose digits below
 constexpr float kFinestScale = 0x1p-20F;  // steps of row_scale
@@ -79,6 +82,12 @@ std::vector<double> MapWeights(const Material& m, const std::vector<double>& gai
   if (m.form == Form::kReciprocal) {
     return ReciprocalMapWeights(m);
   }
+  if (m.form == Form::kTucker) {
+    return TuckerMapWeights(m);
+  }
+  if (m.form == Form::kProfiles) {
+    return ProfilesMapWeights(m);
+  }
   std::vector<double> squares(static_cast<std::size_t>(m.MapSets() * m.terms), 0.0);
   const auto add = [&](int channel, int term, const float* kernel) {
     const double gain = gains[static_cast<std::size_t>(channel)];
@@ -135,6 +144,9 @@ class Rounding {
     for (std::size_t c = 0; c < exact.channels.size(); ++c) {
       gains_.push_back(Gain(job, exact, c));
     }
+    if (exact.form == Form::kTucker) {
+      gains_.assign(1, TuckerGain(exact));
+    }
     weights_ = MapWeights(exact, gains_);
     const auto size = static_cast<std::size_t>(exact.MapSize());
     for (std::size_t n = 0; n < weights_.size(); ++n) {
@@ -158,7 +170,7 @@ class Rounding {
     for (std::size_t n = 0; n < weights_.size(); ++n) {
       // Maps that hardly matter still need a step that is a number.
       const double weight = std::max(weights_[n], 1e-12 * heaviest_);
-      m.steps.f.push_back(static_cast<float>(delta / weight));
+      m.steps.f.push_back(IsCount(n) ? 1.0F : static_cast<float>(delta / weight));
       if (!Round({&m.f[n * map_size], map_size}, m.steps.f.back())) {
         return std::nullopt;
       }
@@ -175,8 +187,9 @@ class Rounding {
               ? kLogKernelFinesse
               : kKernelFinesse * std::sqrt(static_cast<double>(m.WindowSize()));
       const double wanted = delta / (gains_[c] * finesse);
+      const double least = 1.0001 * largest / static_cast<double>(kMostCode);
       const double step =
-          std::max(wanted, 1.0001 * largest / static_cast<double>(kMostCode));
+          m.form == Form::kProfiles ? kLogBetaStep : std::max(wanted, least);
       m.steps.h.push_back(static_cast<float>(step));
       if (!(step > kLeastStep) || !Round(kernels, m.steps.h.back())) {
         return std::nullopt;
@@ -186,6 +199,12 @@ class Rounding {
   }
 
  private:
+  // Whole numbers as they are.
+  bool IsCount(std::size_t map) const {
+    return exact_.form == Form::kTucker &&
+           map == static_cast<std::size_t>(TuckerShiftMap(exact_));
+  }
+
   const Material& exact_;
   std::vector<double> gains_;
   std::vector<double> weights_;

@@ -2,7 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
-#include "reconstruct/internal/little_endian.h"
+#include "core/little_endian.h"
 #include "reconstruct/internal/psf_layout.h"
 #include "reconstruct/rd_dataset.h"
 
@@ -14,7 +14,6 @@ namespace nacre::reconstruct {
 namespace {
 
 using internal::PsfLayout;
-using internal::StoreLittle32;
 
 // The record of one slice.
 void Encode(const PsfLayout& layout,

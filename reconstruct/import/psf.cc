@@ -1,9 +1,9 @@
 #include "reconstruct/import/psf.h"
 
 #include "core/error.h"
+#include "core/little_endian.h"
 #include "core/options_json.h"
 #include "core/provenance.h"
-#include "reconstruct/internal/little_endian.h"
 #include "reconstruct/internal/psf_layout.h"
 #include "reconstruct/rd_dataset.h"
 
@@ -16,7 +16,6 @@
 namespace nacre::reconstruct {
 namespace {
 
-using internal::LoadLittle32;
 using internal::PsfLayout;
 
 PsfLayout ReadLayout(std::ifstream& file,

@@ -1,7 +1,7 @@
 #include "reconstruct/internal/exr_guard.h"
 
 #include "core/error.h"
-#include "reconstruct/internal/little_endian.h"
+#include "core/little_endian.h"
 
 #include <array>
 #include <bit>

@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 class FactorStress : public ::testing::TestWithParam<const char*> {
  protected:
   static FactorOptions Options(int terms) {
-    return {.method = GetParam(), .terms = terms};
+    return {.method = GetParam(), .terms = terms, .window_rank = 0};
   }
   // As many terms, or the few that take the reciprocal model as long.
   static int TermsOf(int terms) {
@@ -32,7 +32,18 @@ class FactorStress : public ::testing::TestWithParam<const char*> {
   }
   static bool IsReciprocal() {
     return GetParam() == std::string("bilinear") ||
-           GetParam() == std::string("reciprocal");
+           GetParam() == std::string("reciprocal") || IsProfiles();
+  }
+  static bool IsProfiles() { return GetParam() == std::string("profiles"); }
+  // Channels are polynomials of their mean, or slices products of profiles.
+  static bool IsRestricted() {
+    return IsReciprocal() || GetParam() == std::string("tucker");
+  }
+  // Gaussians aren't found one after the other: as many as are asked for stay.
+  static void ExpectOneTerm(const Material& m) {
+    if (!IsProfiles()) {
+      EXPECT_EQ(m.terms, 1);
+    }
   }
   // Sums keep each slice's total to a step of row_scale; what is reciprocal can't.
   static void ExpectTotals(const FactorSummary& summary) {
@@ -43,7 +54,7 @@ class FactorStress : public ::testing::TestWithParam<const char*> {
 
 TEST_P(FactorStress, ZerosStayZeros) {
   const auto [m, summary] = Factor(MakeConstant(4, 3, 5, 0), Options(10));
-  EXPECT_EQ(m.terms, 1);
+  ExpectOneTerm(m);
   EXPECT_EQ(summary.relative_l2, 0);
   for (int p = 0; p < 12; ++p) {
     EXPECT_EQ(m.Evaluate(0, p % 4, p / 4, 2, 2), 0);
@@ -52,29 +63,34 @@ TEST_P(FactorStress, ZerosStayZeros) {
 
 TEST_P(FactorStress, AConstantIsOneTerm) {
   const auto [m, summary] = Factor(MakeConstant(6, 5, 7, 0.25F), Options(10));
-  EXPECT_EQ(m.terms, 1);
-  EXPECT_LT(summary.relative_l2, 1e-6);
-  EXPECT_THAT(summary.notes, Contains(HasSubstr("1 of 10 terms")));
+  ExpectOneTerm(m);
+  EXPECT_LT(summary.relative_l2, IsProfiles() ? 0.05 : 1e-6);
+  if (!IsProfiles()) {
+    EXPECT_THAT(summary.notes, Contains(HasSubstr("1 of 10 terms")));
+  }
 }
 
 TEST_P(FactorStress, OneSliceIsExact) {
   const RdDataset dataset = MakeChessboard({.points_x = 1, .points_y = 1});
   const auto [m, summary] = Factor(dataset, Options(10));
-  EXPECT_EQ(m.terms, 1);
-  EXPECT_LT(summary.relative_l2, IsReciprocal() ? 0.01 : 1e-6);  // it isn't symmetric
+  ExpectOneTerm(m);
+  EXPECT_LT(
+      summary.relative_l2,
+      IsRestricted() ? ((IsProfiles() ? 0.3 : 0.01)) : 1e-6);  // it isn't symmetric
 }
 
 TEST_P(FactorStress, OneCellWindows) {
   const RdDataset dataset =
       MakeChessboard({.points_x = 9, .points_y = 7, .core = 1, .channels = 1});
   const auto [m, summary] = Factor(dataset, Options(10));
-  EXPECT_EQ(m.terms, 1);
+  ExpectOneTerm(m);
   EXPECT_LT(summary.relative_l2, IsReciprocal() ? 1e-5 : 1e-6);
 }
 
 TEST_P(FactorStress, OneRowOfPoints) {
   const RdDataset dataset = MakeChessboard({.points_x = 40, .points_y = 1, .core = 7});
-  EXPECT_LT(Factor(dataset, Options(TermsOf(12))).summary.relative_l2, 0.03);
+  EXPECT_LT(Factor(dataset, Options(TermsOf(12))).summary.relative_l2,
+            IsRestricted() ? 0.1 : 0.03);
 }
 
 TEST_P(FactorStress, DuplicatedSlicesHaveTheRankOfOne) {
@@ -84,8 +100,10 @@ TEST_P(FactorStress, DuplicatedSlicesHaveTheRankOfOne) {
     many.rd[n] = one.rd[n % one.rd.size()];
   }
   const auto [m, summary] = Factor(many, Options(4));
-  EXPECT_EQ(m.terms, 1);
-  EXPECT_LT(summary.relative_l2, IsReciprocal() ? 0.01 : 1e-6);  // it isn't symmetric
+  ExpectOneTerm(m);
+  EXPECT_LT(
+      summary.relative_l2,
+      IsRestricted() ? ((IsProfiles() ? 0.3 : 0.01)) : 1e-6);  // it isn't symmetric
 }
 
 TEST_P(FactorStress, TheUnitDoesNotMatter) {
@@ -153,8 +171,8 @@ TEST_P(FactorStress, NotANumberIsRefusedAndNamed) {
 }
 
 TEST_P(FactorStress, ExactRankIsFoundExactly) {
-  if (IsReciprocal()) {
-    GTEST_SKIP() << "these rows aren't reciprocal";
+  if (IsRestricted()) {
+    GTEST_SKIP() << "these rows are of no such form";
   }
   // A positive matrix of rank 3: the linear model must keep three terms and no more.
   RdDataset dataset = MakeConstant(12, 10, 7, 0);
@@ -180,15 +198,21 @@ TEST_P(FactorStress, ExactRankIsFoundExactly) {
   EXPECT_LT(summary.relative_l2, GetParam() == std::string("svd") ? 1e-6 : 0.02);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Methods,
-    FactorStress,
-    ::testing::Values("log-svd", "svd", "sqrt-svd", "nmf", "bilinear", "reciprocal"),
-    [](const auto& method) {
-      std::string name = method.param;
-      std::erase(name, '-');
-      return name;
-    });
+INSTANTIATE_TEST_SUITE_P(Methods,
+                         FactorStress,
+                         ::testing::Values("log-svd",
+                                           "svd",
+                                           "sqrt-svd",
+                                           "tucker",
+                                           "nmf",
+                                           "profiles",
+                                           "bilinear",
+                                           "reciprocal"),
+                         [](const auto& method) {
+                           std::string name = method.param;
+                           std::erase(name, '-');
+                           return name;
+                         });
 
 TEST(FactorStress, SizesThatDoNotFitTheHeaderAreRefused) {
   RdDataset dataset = MakeConstant(3, 3, 3, 1);

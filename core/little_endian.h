@@ -2,11 +2,15 @@
 
 #include <cstdint>
 
-namespace nacre::reconstruct::internal {
+namespace nacre {
 
 inline std::uint32_t LoadLittle32(const unsigned char* bytes) {
   return std::uint32_t{bytes[0]} | std::uint32_t{bytes[1]} << 8 |
          std::uint32_t{bytes[2]} << 16 | std::uint32_t{bytes[3]} << 24;
+}
+
+inline std::uint64_t LoadLittle64(const unsigned char* bytes) {
+  return LoadLittle32(bytes) | std::uint64_t{LoadLittle32(bytes + 4)} << 32;
 }
 
 inline void StoreLittle32(std::uint32_t value, unsigned char* bytes) {
@@ -15,4 +19,9 @@ inline void StoreLittle32(std::uint32_t value, unsigned char* bytes) {
   }
 }
 
-}  // namespace nacre::reconstruct::internal
+inline void StoreLittle64(std::uint64_t value, unsigned char* bytes) {
+  StoreLittle32(static_cast<std::uint32_t>(value), bytes);
+  StoreLittle32(static_cast<std::uint32_t>(value >> 32), bytes + 4);
+}
+
+}  // namespace nacre
