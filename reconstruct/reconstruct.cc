@@ -7,6 +7,8 @@
 #include "core/parallel.h"
 #include "core/provenance.h"
 #include "reconstruct/internal/fill_diagonal.h"
+#include "reconstruct/internal/glare_floor.h"
+#include "reconstruct/internal/gloss.h"
 #include "reconstruct/internal/group_reader.h"
 #include "reconstruct/internal/group_spool.h"
 #include "reconstruct/internal/separation.h"
@@ -24,7 +26,7 @@ namespace nacre::reconstruct {
 namespace {
 
 // One up whenever the same pictures give other values.
-constexpr int kReconstructionVersion = 2;
+constexpr int kReconstructionVersion = 3;
 
 using internal::GroupPicture;
 using internal::GroupReader;
@@ -121,12 +123,8 @@ calibrate::SamplePlane Settle(calibrate::SamplePlane plane) {
 }
 
 // As many groups side by side as the memory is for, and no more than threads.
-// Cutting pixels into cells took memory that the heap keeps.
 int GroupsAtOnce(const GroupReader& reader, const ReconstructOptions& options) {
-  constexpr double kCuttingBytesAWorkingByte = 4;
-  const double left =
-      options.memory_bytes - static_cast<double>(reader.SharedBytes()) -
-      kCuttingBytesAWorkingByte * static_cast<double>(reader.WorkingBytes());
+  const double left = options.memory_bytes - static_cast<double>(reader.SharedBytes());
   const double affordable =
       left / static_cast<double>(reader.WorkingBytes() + reader.ResultBytes());
   return static_cast<int>(
@@ -142,17 +140,19 @@ std::filesystem::path WorkFile(const std::filesystem::path& out) {
 std::uint64_t KeyOf(const acquire::SessionReader& session,
                     const calibrate::Calibration& calibration,
                     const std::filesystem::path& work,
-                    double spot_sigma_mm) {
+                    const calibrate::SpotProfile& spot) {
   const std::filesystem::path written = work.string() + ".calibration.json";
   calibrate::WriteCalibration(written, calibration);
   const std::string hash = HashFile(written);
   std::filesystem::remove(written);
   const std::string text =
-      fmt::format("{} {} {} {}",
+      fmt::format("{} {} {} {} {} {}",
                   kReconstructionVersion,
                   session.manifest().rig_hash,
                   hash,  // of the camera over the sample's plane too
-                  spot_sigma_mm);
+                  spot.xx_mm2,
+                  spot.xy_mm2,
+                  spot.yy_mm2);
   return Hash64(text.data(), text.size());
 }
 
@@ -199,6 +199,7 @@ void WriteSlices(const calibrate::Calibration& calibration,
                  const ReconstructOptions& options,
                  const RdHeader& header,
                  const Separation& separation,
+                 const internal::Gloss& gloss,
                  RdWriter& writer,
                  ReconstructSummary& summary,
                  const ProgressFunction& progress) {
@@ -212,6 +213,7 @@ void WriteSlices(const calibrate::Calibration& calibration,
       std::vector<RdSlice> slices(count);
       std::vector<double> shares(count, 0.0);
       std::vector<internal::SymmetrizeChange> changes(count);
+      std::vector<std::int64_t> below(count, 0);
       ParallelFor(std::ssize(slices), options.thread_count, [&](std::int64_t n) {
         const auto k = static_cast<std::size_t>(n);
         const std::int64_t s =
@@ -220,18 +222,21 @@ void WriteSlices(const calibrate::Calibration& calibration,
         if (options.symmetrize) {
           changes[k] = internal::Symmetrize(header, separation, s, slices[k]);
         }
+        internal::RemoveGloss(header, calibration, gloss, s, slices[k]);
         if (options.specular_radius_cells >= 0) {
           internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
         }
         if (options.state_systematics) {
           internal::AddSystematics(header, calibration, slices[k]);
         }
+        below[k] = internal::MarkBelowFloor(header, separation.Floor(s), slices[k]);
       });
       for (std::size_t k = 0; k < count; ++k) {
         writer.WriteSlice(static_cast<int>(first + k), j, slices[k]);
         summary.max_crosstalk = std::max(summary.max_crosstalk, shares[k]);
         summary.invalid_count +=
             std::count(slices[k].valid.begin(), slices[k].valid.end(), 0);
+        summary.below_floor_count += below[k];
         change.Add(changes[k]);
       }
     }
@@ -241,17 +246,48 @@ void WriteSlices(const calibrate::Calibration& calibration,
   Report(progress, {"reconstruct", header.points_y, header.points_y, "slices"});
 }
 
-double SpotSigmaMm(const acquire::SessionReader& session,
-                   const calibrate::Calibration& calibration) {
+// The mean of the channels': one set of weights serves all.
+calibrate::SpotProfile SpotOf(const acquire::SessionReader& session,
+                              const calibrate::Calibration& calibration) {
   const auto& spots = calibration.corrections.spots;
+  calibrate::SpotProfile mean;
   if (spots.empty()) {
-    return internal::MeasureSpotSigmaMm(session, calibration);
+    const double sigma_mm = internal::MeasureSpotSigmaMm(session, calibration);
+    mean.xx_mm2 = mean.yy_mm2 = sigma_mm * sigma_mm;
   }
-  double variance = 0;
   for (const calibrate::SpotProfile& spot : spots) {
-    variance += 0.5 * (spot.xx_mm2 + spot.yy_mm2) / static_cast<double>(spots.size());
+    const auto count = static_cast<double>(spots.size());
+    mean.xx_mm2 += spot.xx_mm2 / count;
+    mean.xy_mm2 += spot.xy_mm2 / count;
+    mean.yy_mm2 += spot.yy_mm2 / count;
   }
-  return std::sqrt(std::max(0.0, variance));
+  return mean;
+}
+
+// In some groups, evenly over those that were captured.
+internal::Gloss LookForGloss(const acquire::SessionReader& session,
+                             const calibrate::Calibration& calibration,
+                             const calibrate::CameraGeometry& camera,
+                             const calibrate::SamplePlane& plane,
+                             const GroupReader& reader,
+                             const ReconstructOptions& options) {
+  if (!options.remove_gloss || options.specular_radius_cells >= 0) {
+    return {};
+  }
+  constexpr int kGroups = 12;
+  std::vector<int> there;
+  for (int g = 0; g < session.schedule().group_count(); ++g) {
+    if (reader.IsThere(g)) {
+      there.push_back(g);
+    }
+  }
+  std::vector<int> some;
+  const int count = static_cast<int>(there.size());
+  for (int k = 0; k < std::min(kGroups, count); ++k) {
+    some.push_back(
+        there[static_cast<std::size_t>(k * count / std::min(kGroups, count))]);
+  }
+  return internal::MeasureGloss(session, calibration, camera, plane, some);
 }
 
 }  // namespace
@@ -270,7 +306,9 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   calibration.camera = of_rig.camera.OnPlane(state.plane);
   const RdHeader header = HeaderOf(session, calibration, options);
   ReconstructSummary summary;
-  summary.spot_sigma_mm = options.sharpen_spot ? SpotSigmaMm(session, of_rig) : 0;
+  const calibrate::SpotProfile spot =
+      options.sharpen_spot ? SpotOf(session, of_rig) : calibrate::SpotProfile{};
+  summary.spot_sigma_mm = std::sqrt(std::max(0.0, 0.5 * (spot.xx_mm2 + spot.yy_mm2)));
   summary.group_count = session.schedule().group_count();
   summary.slice_count = header.PointCount();
   RdWriter writer(out, header);
@@ -278,15 +316,16 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
     summary.warnings.push_back(warning.name + ": " + warning.text);
   }
   const GroupReader reader(
-      session, calibration, state, header, summary.spot_sigma_mm, options.thread_count);
+      session, calibration, state, header, spot, options.thread_count);
   const std::filesystem::path work = WorkFile(out);
   GroupSpool spool(
       work,
       options.incremental,
-      {.key = KeyOf(session, calibration, work, summary.spot_sigma_mm),
+      {.key = KeyOf(session, calibration, work, spot),
        .group_count = summary.group_count,
        .value_count = reader.lattice().CellCount() * std::ssize(header.channels)});
   Measure(reader, options, spool, summary, progress);
+  spool.Forget();
 
   Separation separation(
       header, session.schedule(), reader, spool, options.thread_count);
@@ -298,7 +337,14 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
     }
   }
   summary.is_dense = separation.IsDense();
-  WriteSlices(calibration, options, header, separation, writer, summary, progress);
+  spool.Forget();
+  const internal::Gloss gloss =
+      LookForGloss(session, of_rig, calibration.camera, state.plane, reader, options);
+  if (std::string text = gloss.Warning(header.channels); !text.empty()) {
+    summary.warnings.push_back(std::move(text));
+  }
+  WriteSlices(
+      calibration, options, header, separation, gloss, writer, summary, progress);
   writer.Finish();
   RdReader written(out);
   summary.reciprocity = MeasureReciprocity(written);

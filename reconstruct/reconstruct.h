@@ -19,6 +19,7 @@ struct ReconstructOptions {
   bool subtract_crosstalk = true;
   bool sharpen_spot = true;
   bool state_systematics = true;
+  bool remove_gloss = true;
   bool symmetrize = false;
   double specular_radius_cells = -1;
 
@@ -40,6 +41,10 @@ struct ReconstructOptions {
           self.state_systematics,
           Range{},
           "sigma includes what the calibration's own uncertainty makes of a value");
+    visit("remove_gloss",
+          self.remove_gloss,
+          Range{},
+          "take the surface's own reflection out of the lit cell, known by its shape");
     visit("specular_radius_cells",
           self.specular_radius_cells,
           Range{-1, 100},
@@ -58,13 +63,14 @@ struct ReconstructSummary {
   std::int64_t frame_count = 0;
   std::int64_t saturated_count = 0;  ///< pixels of merged frames that no exposure saved
   std::int64_t invalid_count = 0;    ///< values not measured
-  double max_crosstalk = 0;          ///< subtracted, relative to a slice's total
-  double spot_sigma_mm = 0;          ///< of the laser as seen; 0 if it wasn't measured
-  std::int64_t group_count = 0;      ///< of spots lit together
-  std::int64_t groups_reused = 0;    ///< from an earlier run
-  std::int64_t groups_missing = 0;   ///< not captured yet
-  bool is_dense = false;             ///< windows overlapped and were separated
-  std::vector<double> tail_spread;   ///< a channel: how far tails are off, relative
+  std::int64_t below_floor_count = 0;  ///< of these, below the glare's floor
+  double max_crosstalk = 0;            ///< subtracted, relative to a slice's total
+  double spot_sigma_mm = 0;         ///< of the laser as seen; 0 if it wasn't measured
+  std::int64_t group_count = 0;     ///< of spots lit together
+  std::int64_t groups_reused = 0;   ///< from an earlier run
+  std::int64_t groups_missing = 0;  ///< not captured yet
+  bool is_dense = false;            ///< windows overlapped and were separated
+  std::vector<double> tail_spread;  ///< a channel: how far tails are off, relative
   ReciprocityFigures reciprocity;
   double symmetrize_change = 0;       ///< Σ |change| / Σ R_d, if asked for
   std::vector<std::string> warnings;  ///< "name: sentence", as calibrate/ names them

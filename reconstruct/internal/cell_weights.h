@@ -1,6 +1,7 @@
 #pragma once
 
 #include "calibrate/calibration.h"
+#include "reconstruct/internal/glare_pyramid.h"
 #include "reconstruct/internal/hdr_merge.h"
 #include "reconstruct/internal/pixel_cells.h"
 #include "reconstruct/rd_dataset.h"
@@ -12,6 +13,13 @@
 
 namespace nacre::reconstruct::internal {
 
+/// What else goes into the weights.
+struct PixelModel {
+  PlaceOnLattice place = {};
+  std::span<const float> factor = {};  ///< a value a pixel is multiplied by; empty: 1
+  bool with_bins = false;              ///< MeansOfBins will be asked for
+};
+
 /// The mean of a picture over a cell is a weighted sum of pixels: the weights of all
 /// cells. Radiance is taken to vary linearly within a pixel that a cell's edge cuts,
 /// with the slopes to its neighbours; and the blur of a Gaussian spot of
@@ -21,9 +29,9 @@ class CellWeights {
  public:
   CellWeights(const CellLattice& lattice,
               const calibrate::CameraGeometry& camera,
-              double spot_sigma_mm,
+              const calibrate::SpotProfile& spot,
               int thread_count,
-              const PlaceOnLattice& place = {});
+              const PixelModel& pixels = {});
 
   const CellLattice& lattice() const { return lattice_; }
 
@@ -43,21 +51,36 @@ class CellWeights {
              std::span<float> means,
              std::span<float> variances) const;
 
-  std::size_t MemoryBytes() const;
+  /// Of all cells; what the picture was binned from is taken to be even over a bin.
+  void MeansOfBins(const BinnedPicture& picture, std::span<float> means) const;
+
+  std::size_t MemoryBytes() const { return pixels_.Bytes() + bins_.Bytes(); }
 
  private:
   // A cell's weights are a box of pixels, each row padded to whole vectors.
   struct Box {
-    std::size_t first_row = 0;     // in rows_
-    std::size_t first_weight = 0;  // in weights_
+    std::size_t first_row = 0;     // in `rows`
+    std::size_t first_weight = 0;  // in `weights`
     int row_count = 0;             // 0: the camera doesn't see all of the cell
     int row_width = 0;
   };
+  struct Boxes {
+    std::vector<Box> boxes;
+    std::vector<std::uint32_t> rows;  // the first pixel of each row of each box
+    std::vector<float> weights;
+
+    void Append(const Boxes& others);
+    std::size_t Bytes() const {
+      return boxes.size() * sizeof(Box) + rows.size() * sizeof(rows[0]) +
+             weights.size() * sizeof(float);
+    }
+  };
+  struct Row;        // of one cell, as it is added to Boxes
+  class BoxBuilder;  // the boxes of some rows of cells
 
   CellLattice lattice_;
-  std::vector<Box> boxes_;
-  std::vector<std::uint32_t> rows_;  // the first pixel of each row of each box
-  std::vector<float> weights_;
+  Boxes pixels_;
+  Boxes bins_;  // the same weights, added up in bins
 };
 
 }  // namespace nacre::reconstruct::internal

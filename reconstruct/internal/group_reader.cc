@@ -26,13 +26,6 @@ std::vector<std::vector<std::int64_t>> FindPictures(
   return pictures;
 }
 
-std::vector<float> AmbientMap(const calibrate::Calibration& calibration) {
-  const calibrate::SmoothField& ambient = calibration.corrections.ambient;
-  return ambient.empty()
-             ? std::vector<float>()
-             : ambient.Map(calibration.camera.width_px, calibration.camera.height_px);
-}
-
 std::vector<float> InverseFlat(const calibrate::Calibration& calibration) {
   const calibrate::SmoothField& flat = calibration.corrections.flat_field;
   std::vector<float> inverse;
@@ -45,12 +38,27 @@ std::vector<float> InverseFlat(const calibrate::Calibration& calibration) {
   return inverse;
 }
 
+bool IsIdeal(const calibrate::SamplePlane& plane) {
+  return plane.height_mm == 0 && plane.slope_x == 0 && plane.slope_y == 0;
+}
+
+// Where a beam aimed at a point arrives.
+PlaceOnLattice OnPlane(const calibrate::Calibration& calibration,
+                       const calibrate::SamplePlane& plane) {
+  if (IsIdeal(plane)) {
+    return {};
+  }
+  return [&calibration, plane](PointMm aimed) {
+    return calibrate::OnSurface(calibration, plane, aimed);
+  };
+}
+
 // A beam aimed at x_i arrives elsewhere on a surface that lies higher or lower; the
 // lattice goes with the beams. The shift varies too slowly for it to matter at which
 // end of it it is taken.
 PlaceOnLattice WhereLit(const calibrate::Calibration& calibration,
                         const calibrate::SamplePlane& plane) {
-  if (plane.height_mm == 0 && plane.slope_x == 0 && plane.slope_y == 0) {
+  if (IsIdeal(plane)) {
     return {};
   }
   return [&calibration, plane](PointMm seen) {
@@ -65,7 +73,7 @@ GroupReader::GroupReader(const acquire::SessionReader& session,
                          const calibrate::Calibration& calibration,
                          const calibrate::SessionState& state,
                          const RdHeader& header,
-                         double spot_sigma_mm,
+                         const calibrate::SpotProfile& spot,
                          int thread_count)
     : session_(session),
       calibration_(calibration),
@@ -73,17 +81,26 @@ GroupReader::GroupReader(const acquire::SessionReader& session,
       header_(header),
       weights_(CellLattice(header),
                calibration.camera,
-               spot_sigma_mm,
+               spot,
                thread_count,
-               WhereLit(calibration, state.plane)),
+               {.place = WhereLit(calibration, state.plane),
+                .factor = InverseFlat(calibration),
+                .with_bins = !calibration.corrections.glare.empty()}),
+      shift_(CellLattice(header),
+             calibration.camera,
+             OnPlane(calibration, state.plane),
+             header,
+             BeamOffsets(session, calibration, header)),
       pictures_(FindPictures(session)),
       glare_(calibration.corrections.glare,
              calibration.camera.width_px,
-             calibration.camera.height_px),
-      ambient_(AmbientMap(calibration)),
-      inverse_flat_(InverseFlat(calibration)) {
+             calibration.camera.height_px) {
   const calibrate::Glare& glare = calibration.corrections.glare;
-  glare_sigma_ = glare.fraction > 0 ? glare.fraction_sigma / glare.fraction : 0;
+  if (glare.fraction > 0) {
+    glare_sigma_ = static_cast<float>(
+        std::hypot(glare.fraction_sigma / glare.fraction, GlarePyramid::kError));
+  }
+  TakeAmbient();
   // RdPerRate is a product of what depends on x_i and what depends on x_o.
   const double at_origin = calibration.RdPerRate(0, {0, 0}, {0, 0}, header.eta);
   exit_factor_.reserve(static_cast<std::size_t>(lattice().CellCount()));
@@ -155,24 +172,37 @@ double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
          (count > 0 ? count / flux : 1);
 }
 
-// What is known of glare only to so much is noise of the pixels it falls on: that is
-// the glare's floor.
-void GroupReader::Correct(RateFrame& rates) const {
-  for (std::size_t k = 0; k < ambient_.size(); ++k) {
-    rates.rate[k] -= ambient_[k];
+// Ambient light is the same in all pictures: what it is in the cells.
+void GroupReader::TakeAmbient() {
+  const calibrate::SmoothField& ambient = calibration_.corrections.ambient;
+  if (ambient.empty()) {
+    return;
   }
-  if (!calibration_.corrections.glare.empty()) {
-    const std::vector<float> seen = rates.rate;
-    glare_.Remove(rates.rate);
-    for (std::size_t k = 0; k < seen.size(); ++k) {
-      const float unsure = static_cast<float>(glare_sigma_) * (seen[k] - rates.rate[k]);
-      rates.variance[k] +=
-          rates.variance[k] < 0 || seen[k] < rates.rate[k] ? 0.0F : unsure * unsure;
-    }
+  const auto cells = static_cast<std::size_t>(lattice().CellCount());
+  RateFrame frame;
+  frame.rate = ambient.Map(calibration_.camera.width_px, calibration_.camera.height_px);
+  frame.variance.assign(frame.rate.size(), 0.0F);
+  std::vector<float> rate(cells);
+  std::vector<float> variance(cells);
+  std::vector<float> glare(cells, 0.0F);
+  TakeGlare(frame, {rate, variance, glare});
+  ambient_ = std::move(rate);
+  ambient_glare_ = std::move(glare);
+}
+
+// Means over cells of a picture less its glare, and the light that was glare.
+void GroupReader::TakeGlare(const RateFrame& rates, CellValues cells) const {
+  weights_.Means(rates, 0, cells.rate, cells.variance);
+  if (glare_.empty()) {
+    return;
   }
-  for (std::size_t k = 0; k < inverse_flat_.size(); ++k) {
-    rates.rate[k] *= inverse_flat_[k];
-    rates.variance[k] *= inverse_flat_[k] * inverse_flat_[k];
+  BinnedPicture binned(calibration_.camera.width_px, calibration_.camera.height_px);
+  binned.Fill(rates.rate, calibration_.camera.width_px);
+  weights_.MeansOfBins(glare_.Scattered(std::move(binned)), cells.glare);
+  const auto gain = static_cast<float>(1 / (1 - glare_.fraction()));
+  for (std::size_t k = 0; k < cells.rate.size(); ++k) {
+    cells.rate[k] = cells.rate[k] * gain - cells.glare[k];
+    cells.variance[k] *= gain * gain;
   }
 }
 
@@ -182,9 +212,11 @@ GroupPicture GroupReader::Read(int group) const {
   GroupPicture picture;
   picture.rd.assign(channels * cells, 0.0F);
   picture.sigma.assign(channels * cells, -1.0F);
+  picture.floor.assign(channels * cells, 0.0F);
   RateFrame rates;
+  std::vector<acquire::Frame> frames;
   for (std::size_t c = 0; c < channels; ++c) {
-    std::vector<acquire::Frame> frames;
+    frames.clear();
     for (const std::int64_t number : Pictures(group, static_cast<int>(c))) {
       if (session_.WasTaken(number)) {
         frames.push_back(session_.ReadFrame(number));
@@ -196,20 +228,37 @@ GroupPicture GroupReader::Read(int group) const {
     }
     MergeExposures(frames, calibration_, rates);
     picture.saturated_count += rates.saturated_count;
-    Correct(rates);
-    const auto rd = std::span(picture.rd).subspan(c * cells, cells);
-    const auto sigma = std::span(picture.sigma).subspan(c * cells, cells);
-    weights_.Means(rates, 0, rd, sigma);
-    for (std::size_t k = 0; k < cells; ++k) {
-      rd[k] *= exit_factor_[k];
-      sigma[k] = sigma[k] < 0 ? -1.0F : std::sqrt(sigma[k]) * exit_factor_[k];
-    }
+    const CellValues values{std::span(picture.rd).subspan(c * cells, cells),
+                            std::span(picture.sigma).subspan(c * cells, cells),
+                            std::span(picture.floor).subspan(c * cells, cells)};
+    TakeGlare(rates, values);
+    shift_.Apply(rates, session_.schedule().Group(group), values.rate);
+    ToRd(values);
   }
   return picture;
 }
 
+// From rates, variances and glare to R_d, sigma and floor, in place. What is known of
+// glare only to so much is common to neighbouring cells: no mean over pixels lessens
+// it.
+void GroupReader::ToRd(CellValues cells) const {
+  for (std::size_t k = 0; k < ambient_.size(); ++k) {
+    cells.rate[k] -= ambient_[k];
+    cells.glare[k] -= ambient_glare_[k];
+  }
+  for (std::size_t k = 0; k < cells.rate.size(); ++k) {
+    const float exit = exit_factor_[k];
+    const float unsure = glare_sigma_ * std::max(0.0F, cells.glare[k]);
+    const float variance = cells.variance[k];
+    cells.rate[k] *= exit;
+    cells.variance[k] =
+        variance < 0 ? -1.0F : std::sqrt(variance + unsure * unsure) * exit;
+    cells.glare[k] = unsure * exit;
+  }
+}
+
 std::size_t GroupReader::ResultBytes() const {
-  return header_.channels.size() * static_cast<std::size_t>(lattice().CellCount()) * 2 *
+  return header_.channels.size() * static_cast<std::size_t>(lattice().CellCount()) * 3 *
          sizeof(float);
 }
 

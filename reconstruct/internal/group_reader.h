@@ -2,13 +2,15 @@
 
 #include "acquire/session.h"
 #include "calibrate/calibration.h"
-#include "calibrate/glare.h"
 #include "calibrate/session_state.h"
 #include "reconstruct/internal/cell_weights.h"
+#include "reconstruct/internal/glare_pyramid.h"
 #include "reconstruct/internal/hdr_merge.h"
+#include "reconstruct/internal/window_shift.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,7 @@ namespace nacre::reconstruct::internal {
 struct GroupPicture {
   std::vector<float> rd;     ///< [channel][cell]
   std::vector<float> sigma;  ///< of noise; below 0 where it isn't measured
+  std::vector<float> floor;  ///< standard deviation of what glare leaves there
   std::int64_t frame_count = 0;
   std::int64_t saturated_count = 0;
 };
@@ -34,7 +37,7 @@ class GroupReader {
               const calibrate::Calibration& calibration,
               const calibrate::SessionState& state,
               const RdHeader& header,
-              double spot_sigma_mm,
+              const calibrate::SpotProfile& spot,
               int thread_count);
 
   const CellLattice& lattice() const { return weights_.lattice(); }
@@ -54,28 +57,39 @@ class GroupReader {
   /// outline and an adaptive capture leave points out.
   std::vector<bool> LitPoints() const;
 
-  std::size_t SharedBytes() const { return weights_.MemoryBytes(); }
+  std::size_t SharedBytes() const {
+    return weights_.MemoryBytes() + shift_.MemoryBytes();
+  }
   /// Memory that one call of Read() needs, and what its result holds.
   std::size_t WorkingBytes() const;
   std::size_t ResultBytes() const;
 
  private:
+  // Of all cells: rates, their variances and the glare that was in them.
+  struct CellValues {
+    std::span<float> rate;
+    std::span<float> variance;
+    std::span<float> glare;
+  };
   const std::vector<std::int64_t>& Pictures(int group, int channel) const;
-  void Correct(RateFrame& rates) const;
+  void TakeAmbient();
+  void TakeGlare(const RateFrame& rates, CellValues cells) const;
+  void ToRd(CellValues cells) const;
 
   const acquire::SessionReader& session_;
   const calibrate::Calibration& calibration_;
   const calibrate::SessionState& state_;
   const RdHeader& header_;
   CellWeights weights_;
+  WindowShift shift_;  // to where the beams really were
   /// [group · channels + channel]: numbers of the pictures, one an exposure.
   std::vector<std::vector<std::int64_t>> pictures_;
   /// R_d of unit rate is exit_factor_[cell] · that of the spot and channel.
   std::vector<float> exit_factor_;
-  calibrate::GlareFilter glare_;
-  double glare_sigma_ = 0;           // of what is taken away as glare, relative
-  std::vector<float> ambient_;       // counts per µs; empty: none
-  std::vector<float> inverse_flat_;  // empty: 1
+  GlarePyramid glare_;
+  float glare_sigma_ = 0;             // of what is taken away as glare, relative
+  std::vector<float> ambient_;        // a cell, glare taken away; empty: none
+  std::vector<float> ambient_glare_;  // what was taken away
 };
 
 }  // namespace nacre::reconstruct::internal

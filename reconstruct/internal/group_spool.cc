@@ -17,12 +17,14 @@ namespace {
 
 // The head of the file; a file of another version differs in the first word.
 struct FileHead {
-  std::array<char, 8> magic = {'N', 'A', 'C', 'R', 'E', 'W', 'K', '1'};
+  std::array<char, 8> magic = {'N', 'A', 'C', 'R', 'E', 'W', 'K', '2'};
   std::uint64_t key = 0;
   std::int64_t group_count = 0;
   std::int64_t value_count = 0;
   friend bool operator==(const FileHead&, const FileHead&) = default;
 };
+
+constexpr int kArrays = 3;  // R_d, sigma, floor
 
 void WriteAll(int fd, const void* data, std::size_t count, std::int64_t offset) {
   const auto* bytes = static_cast<const unsigned char*>(data);
@@ -64,7 +66,7 @@ struct GroupSpool::SlotHead {
 GroupSpool::GroupSpool(const std::filesystem::path& path,
                        bool is_named,
                        const Shape& shape)
-    : shape_(shape), held_(static_cast<std::size_t>(shape.group_count), false) {
+    : shape_(shape), held_(static_cast<std::size_t>(shape.group_count), 0) {
   fd_ = OpenFile(path, is_named);
   if (fd_ < 0) {
     throw SystemError("cannot make the work file " + path.string());
@@ -104,7 +106,7 @@ GroupSpool::~GroupSpool() {
 
 std::int64_t GroupSpool::SlotBytes() const {
   return static_cast<std::int64_t>(sizeof(SlotHead)) +
-         2 * shape_.value_count * static_cast<std::int64_t>(sizeof(float));
+         kArrays * shape_.value_count * static_cast<std::int64_t>(sizeof(float));
 }
 
 std::int64_t GroupSpool::Offset(int g) const {
@@ -126,6 +128,18 @@ std::span<const float> GroupSpool::Sigma(int g) const {
           static_cast<std::size_t>(shape_.value_count)};
 }
 
+std::span<const float> GroupSpool::Floor(int g) const {
+  return {Rd(g).data() + 2 * shape_.value_count,
+          static_cast<std::size_t>(shape_.value_count)};
+}
+
+void GroupSpool::Forget() const {
+  // The map is shared and only read: nothing is lost, and if it fails nothing is won.
+  ::madvise(const_cast<unsigned char*>(mapped_),
+            static_cast<std::size_t>(Offset(static_cast<int>(shape_.group_count))),
+            MADV_DONTNEED);
+}
+
 std::int64_t GroupSpool::FrameCount(int g) const {
   return Head(g).frame_count;
 }
@@ -137,28 +151,29 @@ std::int64_t GroupSpool::SaturatedCount(int g) const {
 bool GroupSpool::TakeUp(int g, std::uint64_t state) {
   const SlotHead& head = Head(g);
   const std::size_t bytes =
-      2 * static_cast<std::size_t>(shape_.value_count) * sizeof(float);
+      kArrays * static_cast<std::size_t>(shape_.value_count) * sizeof(float);
   const bool whole = head.payload != 0 && head.state == state &&
                      head.payload == Hash64(Rd(g).data(), bytes);
-  held_[static_cast<std::size_t>(g)] = whole;
+  held_[static_cast<std::size_t>(g)] = whole ? 1 : 0;
   return whole;
 }
 
 void GroupSpool::Park(int g, std::uint64_t state, const GroupPicture& picture) {
-  Expect(std::ssize(picture.rd) == shape_.value_count &&
-             std::ssize(picture.sigma) == shape_.value_count,
-         "a picture of the spool's shape");
-  const std::size_t bytes = picture.rd.size() * sizeof(float);
   std::int64_t offset = Offset(g) + static_cast<std::int64_t>(sizeof(SlotHead));
-  WriteAll(fd_, picture.rd.data(), bytes, offset);
-  offset += static_cast<std::int64_t>(bytes);
-  WriteAll(fd_, picture.sigma.data(), bytes, offset);
+  std::int64_t bytes = 0;
+  for (const std::vector<float>* values :
+       {&picture.rd, &picture.sigma, &picture.floor}) {
+    Expect(std::ssize(*values) == shape_.value_count, "a picture of the spool's shape");
+    const std::size_t size = values->size() * sizeof(float);
+    WriteAll(fd_, values->data(), size, offset + bytes);
+    bytes += static_cast<std::int64_t>(size);
+  }
   const SlotHead head{.state = state,
-                      .payload = Hash64(Rd(g).data(), 2 * bytes),
+                      .payload = Hash64(Rd(g).data(), static_cast<std::size_t>(bytes)),
                       .frame_count = picture.frame_count,
                       .saturated_count = picture.saturated_count};
   WriteAll(fd_, &head, sizeof head, Offset(g));
-  held_[static_cast<std::size_t>(g)] = true;
+  held_[static_cast<std::size_t>(g)] = 1;
 }
 
 }  // namespace nacre::reconstruct::internal

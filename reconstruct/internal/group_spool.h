@@ -31,10 +31,15 @@ class GroupSpool {
   bool TakeUp(int g, std::uint64_t state);
   void Park(int g, std::uint64_t state, const GroupPicture& picture);
 
-  bool Holds(int g) const { return held_[static_cast<std::size_t>(g)]; }
+  /// Gives back the memory that pages read so far hold; they stay in the system's
+  /// cache.
+  void Forget() const;
+
+  bool Holds(int g) const { return held_[static_cast<std::size_t>(g)] != 0; }
   /// [channel][cell], as in GroupPicture; of a group that is held.
   std::span<const float> Rd(int g) const;
   std::span<const float> Sigma(int g) const;
+  std::span<const float> Floor(int g) const;
   std::int64_t FrameCount(int g) const;
   std::int64_t SaturatedCount(int g) const;
 
@@ -45,7 +50,7 @@ class GroupSpool {
   std::int64_t Offset(int g) const;
 
   Shape shape_;
-  std::vector<bool> held_;
+  std::vector<char> held_;  // not of bool: threads set their own
   int fd_ = -1;
   const unsigned char* mapped_ = nullptr;
 };

@@ -1,6 +1,5 @@
 #include "reconstruct/internal/pixel_cells.h"
 
-#include "core/parallel.h"
 #include "reconstruct/internal/polygon.h"
 
 #include <algorithm>
@@ -11,8 +10,19 @@ namespace {
 
 using Corners = std::vector<Polygon::Corner>;
 
-// Where the corners between pixel rows `row − 1` and `row` lie, in cells from the
-// lattice's upper left corner, +y down.
+// Where a corner of pixels lies, in cells from the lattice's upper left corner, +y
+// down.
+Polygon::Corner CornerAt(const CellLattice& lattice,
+                         const calibrate::CameraGeometry& camera,
+                         const PlaceOnLattice& place,
+                         calibrate::PixelPoint corner) {
+  const PointMm seen = camera.SampleFromPixel(corner);
+  const PointMm p = place ? place(seen) : seen;
+  return {(p.x - lattice.corner_mm.x) / lattice.pitch_mm,
+          (lattice.corner_mm.y - p.y) / lattice.pitch_mm};
+}
+
+// The corners between pixel rows `row − 1` and `row`.
 Corners CornersAbove(const CellLattice& lattice,
                      const calibrate::CameraGeometry& camera,
                      const PlaceOnLattice& place,
@@ -20,12 +30,29 @@ Corners CornersAbove(const CellLattice& lattice,
   Corners corners;
   corners.reserve(static_cast<std::size_t>(camera.width_px) + 1);
   for (int column = 0; column <= camera.width_px; ++column) {
-    const PointMm seen = camera.SampleFromPixel({column - 0.5, row - 0.5});
-    const PointMm p = place ? place(seen) : seen;
-    corners.push_back({(p.x - lattice.corner_mm.x) / lattice.pitch_mm,
-                       (lattice.corner_mm.y - p.y) / lattice.pitch_mm});
+    corners.push_back(CornerAt(lattice, camera, place, {column - 0.5, row - 0.5}));
   }
   return corners;
+}
+
+// Whether the corners above a pixel row may lie in the band, or between two such rows
+// that do: by some of them, which bend little in between.
+bool MayTouch(const CellLattice& lattice,
+              const calibrate::CameraGeometry& camera,
+              const PlaceOnLattice& place,
+              RowBand band,
+              int row) {
+  constexpr int kPlaces = 8;
+  constexpr double kMarginCells = 1;
+  double least = 1e30;
+  double most = -1e30;
+  for (int k = 0; k <= kPlaces; ++k) {
+    const double x = -0.5 + static_cast<double>(k) * camera.width_px / kPlaces;
+    const double y = CornerAt(lattice, camera, place, {x, row - 0.5}).y;
+    least = std::min(least, y);
+    most = std::max(most, y);
+  }
+  return most > band.begin - kMarginCells && least < band.end + kMarginCells;
 }
 
 // A pixel's corners, clockwise as seen in the picture, and the inverse of the linear
@@ -63,7 +90,7 @@ struct Box {
   int end_y;
 };
 
-Box CellsAround(const Polygon& quad, const CellLattice& lattice) {
+Box CellsAround(const Polygon& quad, const CellLattice& lattice, RowBand band) {
   double min_x = quad.corners[0].x;
   double max_x = min_x;
   double min_y = quad.corners[0].y;
@@ -80,18 +107,24 @@ Box CellsAround(const Polygon& quad, const CellLattice& lattice) {
   };
   return {cell(min_x, lattice.columns),
           std::min(lattice.columns, cell(max_x, lattice.columns) + (max_x > 0 ? 1 : 0)),
-          cell(min_y, lattice.rows),
-          std::min(lattice.rows, cell(max_y, lattice.rows) + (max_y > 0 ? 1 : 0))};
+          std::max(band.begin, cell(min_y, lattice.rows)),
+          std::min(band.end, cell(max_y, lattice.rows) + (max_y > 0 ? 1 : 0))};
 }
 
+struct PixelRow {
+  int row;
+  const Corners& above;
+  const Corners& below;
+};
+
 void CutRow(const CellLattice& lattice,
-            const Corners& above,
-            const Corners& below,
-            int row,
+            RowBand band,
+            const PixelRow& pixels,
             std::vector<PixelPiece>& pieces) {
+  const auto& [row, above, below] = pixels;
   for (int column = 0; column + 1 < static_cast<int>(above.size()); ++column) {
     const Pixel pixel(above, below, column);
-    const Box box = CellsAround(pixel.quad, lattice);
+    const Box box = CellsAround(pixel.quad, lattice, band);
     for (int y = box.begin_y; y < box.end_y; ++y) {
       for (int x = box.begin_x; x < box.end_x; ++x) {
         const Polygon piece = ClipToBox(pixel.quad, x, y, x + 1, y + 1);
@@ -123,21 +156,27 @@ PointMm CellLattice::Centre(int column, int row) const {
           corner_mm.y - (row + 0.5) * pitch_mm};
 }
 
-std::vector<std::vector<PixelPiece>> CutPixels(const CellLattice& lattice,
-                                               const calibrate::CameraGeometry& camera,
-                                               const PlaceOnLattice& place,
-                                               int thread_count) {
-  std::vector<std::vector<PixelPiece>> rows(static_cast<std::size_t>(camera.height_px));
-  constexpr std::int64_t kBlock = 16;
-  ParallelForBlocks(camera.height_px, kBlock, thread_count, [&](auto begin, auto end) {
-    Corners above = CornersAbove(lattice, camera, place, static_cast<int>(begin));
-    for (int row = static_cast<int>(begin); row < static_cast<int>(end); ++row) {
+std::vector<PixelPiece> CutPixels(const CellLattice& lattice,
+                                  const calibrate::CameraGeometry& camera,
+                                  const PlaceOnLattice& place,
+                                  RowBand band) {
+  std::vector<PixelPiece> pieces;
+  Corners above;
+  bool was_near = false;
+  for (int row = 0; row < camera.height_px; ++row) {
+    const bool is_near = MayTouch(lattice, camera, place, band, row) ||
+                         MayTouch(lattice, camera, place, band, row + 1);
+    if (is_near) {
+      if (!was_near) {
+        above = CornersAbove(lattice, camera, place, row);
+      }
       Corners below = CornersAbove(lattice, camera, place, row + 1);
-      CutRow(lattice, above, below, row, rows[static_cast<std::size_t>(row)]);
+      CutRow(lattice, band, {row, above, below}, pieces);
       above = std::move(below);
     }
-  });
-  return rows;
+    was_near = is_near;
+  }
+  return pieces;
 }
 
 }  // namespace nacre::reconstruct::internal

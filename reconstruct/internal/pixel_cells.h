@@ -38,10 +38,17 @@ struct PixelPiece {
 /// Where a point seen on the sample's surface lies in the lattice; empty: where it is.
 using PlaceOnLattice = std::function<PointMm(PointMm)>;
 
-/// All pieces, sorted by pixel rows. Pixels cover quadrilaterals of the sample plane.
-std::vector<std::vector<PixelPiece>> CutPixels(const CellLattice& lattice,
-                                               const calibrate::CameraGeometry& camera,
-                                               const PlaceOnLattice& place,
-                                               int thread_count);
+/// Cells of those rows of a lattice.
+struct RowBand {
+  int begin;
+  int end;
+};
+
+/// All pieces of cells in `band`, sorted by pixels. Pixels cover quadrilaterals of the
+/// sample plane.
+std::vector<PixelPiece> CutPixels(const CellLattice& lattice,
+                                  const calibrate::CameraGeometry& camera,
+                                  const PlaceOnLattice& place,
+                                  RowBand band);
 
 }  // namespace nacre::reconstruct::internal

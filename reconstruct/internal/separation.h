@@ -46,6 +46,10 @@ class Separation {
   /// taken away.
   RdSlice Slice(std::int64_t s, double* share = nullptr) const;
 
+  /// What glare leaves uncertain of slice s, a standard deviation a value (in
+  /// glare_floor.cc).
+  std::vector<float> Floor(std::int64_t s) const;
+
   /// Whether windows overlap, so that separating is not a small correction.
   bool IsDense() const { return is_dense_; }
   /// How far tails are off, relative, a channel.

@@ -102,6 +102,10 @@ RateFrame Picture(const calibrate::CameraGeometry& camera,
   return frame;
 }
 
+calibrate::SpotProfile Round(double sigma_mm) {
+  return {.xx_mm2 = sigma_mm * sigma_mm, .yy_mm2 = sigma_mm * sigma_mm};
+}
+
 double Gaussian(double x, double y, double variance) {
   return std::exp(-0.5 * (x * x + y * y) / variance) /
          (2 * std::numbers::pi * variance);
@@ -120,8 +124,8 @@ double GaussianCell(double x, double y, double pitch, double variance) {
 TEST(CellWeights, EvenLightIsEven) {
   const auto camera = Camera(0.1);
   const CellLattice lattice{Header()};
-  const CellWeights plain(lattice, camera, 0, 1);
-  const CellWeights sharp(lattice, camera, 0.3, 1);
+  const CellWeights plain(lattice, camera, {}, 1);
+  const CellWeights sharp(lattice, camera, Round(0.3), 1);
   const RateFrame frame = Picture(camera, [](double, double) { return 7.0; });
   for (std::int64_t cell = 0; cell < lattice.CellCount(); ++cell) {
     const auto value = plain.Mean(frame, cell);
@@ -139,7 +143,7 @@ TEST(CellWeights, APeakTwoPixelsWideIsBinnedExactly) {
     const auto camera = Camera(turn);
     const RdHeader header = Header();
     const CellLattice lattice{header};
-    const CellWeights weights(lattice, camera, 0, 1);
+    const CellWeights weights(lattice, camera, {}, 1);
     const double variance = 0.6 * 0.6;
     const RateFrame frame = Picture(
         camera, [&](double x, double y) { return Gaussian(x - 1, y - 1, variance); });
@@ -166,8 +170,8 @@ TEST(CellWeights, SharpeningUndoesTheSpotsWidth) {
   const RateFrame blurred = Picture(camera, [&](double x, double y) {
     return Gaussian(x - 1, y - 1, variance + spot * spot);
   });
-  const CellWeights plain(lattice, camera, 0, 1);
-  const CellWeights sharp(lattice, camera, spot, 1);
+  const CellWeights plain(lattice, camera, {}, 1);
+  const CellWeights sharp(lattice, camera, Round(spot), 1);
   double plain_error = 0;
   double sharp_error = 0;
   for (int row = 0; row < lattice.rows; ++row) {
@@ -186,7 +190,7 @@ TEST(CellWeights, CellsThatAreNotSeenAreNotValid) {
   auto camera = Camera(0);
   camera.width_px = 40;  // of the 14 columns of cells, the right half is out of view
   const CellLattice lattice{Header()};
-  const CellWeights weights(lattice, camera, 0.1, 1);
+  const CellWeights weights(lattice, camera, Round(0.1), 1);
   const RateFrame frame = Picture(camera, [](double, double) { return 1.0; });
   EXPECT_TRUE(weights.Mean(frame, lattice.Index(4, 5)).valid);
   EXPECT_FALSE(weights.Mean(frame, lattice.Index(12, 5)).valid);
@@ -195,7 +199,7 @@ TEST(CellWeights, CellsThatAreNotSeenAreNotValid) {
 TEST(CellWeights, ASaturatedPixelSpoilsItsCell) {
   const auto camera = Camera(0);
   const CellLattice lattice{Header()};
-  const CellWeights weights(lattice, camera, 0, 1);
+  const CellWeights weights(lattice, camera, {}, 1);
   RateFrame frame = Picture(camera, [](double, double) { return 1.0; });
   const auto pixel = camera.PixelFromSample({1, 1});
   frame.variance[static_cast<std::size_t>(std::lround(pixel.y) * camera.width_px +

@@ -1,0 +1,356 @@
+#include "reconstruct/internal/glare_pyramid.h"
+
+#include <Eigen/QR>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace nacre::reconstruct::internal {
+namespace {
+
+// A Gaussian is convolved at the coarsest level where it is that many bins wide.
+constexpr double kBinsASigma = 1.25;
+constexpr int kSmallestPicture = 4;  // bins a side
+
+double Density(double r2, double variance) {
+  return std::exp(-0.5 * r2 / variance) / (2 * std::numbers::pi * variance);
+}
+
+// Side of a level's bins, pixels.
+int SideAt(int level) {
+  return BinnedPicture::kSide << level;
+}
+
+// What boxes at the finest level and tents from level to level, both there and back,
+// do to a Gaussian's variance, pixels².
+double VarianceAdded(int level) {
+  double variance = (SideAt(0) * SideAt(0) - 1) / 6.0;
+  for (int l = 1; l <= level; ++l) {
+    variance += 3.0 / 8 * SideAt(l) * SideAt(l);
+  }
+  return variance;
+}
+
+// The sum of K over a picture's reach, pixel by pixel.
+double Sum(const calibrate::Glare& glare, int reach) {
+  double sum = 0;
+  for (int y = 0; y <= reach; ++y) {
+    for (int x = 1; x <= reach; ++x) {  // a quarter of the plane, and its axis
+      const double r = std::hypot(x, y);
+      sum += r <= reach ? 4 * glare.DensityAt(r) : 0;
+    }
+  }
+  return sum;
+}
+
+// Distances at which the sum of Gaussians is to agree: by half a pixel beside the hole,
+// then by shares, and beyond the reach, where K ends.
+std::vector<double> FitRadii(double hole_px, double reach_px) {
+  std::vector<double> radii;
+  for (double r = 0.5; r < 3 * reach_px; r = r < 3 * hole_px ? r + 0.5 : r * 1.06) {
+    radii.push_back(r);
+  }
+  return radii;
+}
+
+constexpr int kBlock = 32;
+
+// out[x] += Σ_t taps[t] · in[x + t · step], a multiple of kBlock values.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddTaps(
+    const float* __restrict in,
+    std::size_t step,
+    const std::vector<float>& taps,
+    std::size_t count,
+    float* __restrict out) {
+  for (std::size_t x = 0; x < count; x += kBlock) {
+    float sum[kBlock] = {};
+    for (std::size_t t = 0; t < taps.size(); ++t) {
+      const float tap = taps[t];
+      const float* from = in + x + t * step;
+      for (std::size_t lane = 0; lane < kBlock; ++lane) {
+        sum[lane] += tap * from[lane];
+      }
+    }
+    for (std::size_t lane = 0; lane < kBlock; ++lane) {
+      out[x + lane] += sum[lane];
+    }
+  }
+}
+
+// out[x] = upper[2 x] + upper[2 x + 1] + lower[2 x] + lower[2 x + 1].
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddPairs(
+    const float* __restrict upper,
+    const float* __restrict lower,
+    std::size_t count,
+    float* __restrict out) {
+  for (std::size_t x = 0; x < count; ++x) {
+    out[x] = (upper[2 * x] + upper[2 * x + 1]) + (lower[2 * x] + lower[2 * x + 1]);
+  }
+}
+
+// Sums over 2 × 2 values of a picture of odd or even sides.
+void Halve(const float* in, int width, int height, BinnedPicture& out) {
+  const auto w = static_cast<std::size_t>(width);
+  const std::vector<float> nothing(w, 0.0F);
+  for (int y = 0; y < out.height; ++y) {
+    const float* upper = in + static_cast<std::size_t>(2 * y) * w;
+    const float* lower = 2 * y + 1 < height ? upper + w : nothing.data();
+    float* row = &out.values[static_cast<std::size_t>(y * out.width)];
+    AddPairs(upper, lower, w / 2, row);
+    if (w % 2 != 0) {
+      row[w / 2] = upper[w - 1] + lower[w - 1];
+    }
+  }
+}
+
+// coarse = fine, each value shared between the two nearest bins along each axis so that
+// the light's place is kept, not only its sum; beyond the rim is the rim. A box would
+// move light by half a bin.
+void Shrink(const BinnedPicture& fine, BinnedPicture& coarse) {
+  const auto width = static_cast<std::size_t>(fine.width);
+  const std::size_t half = width / 2;
+  std::vector<float> row(static_cast<std::size_t>(coarse.width));
+  const std::size_t last = row.size() - 1;
+  std::fill(coarse.values.begin(), coarse.values.end(), 0.0F);
+  for (int y = 0; y < fine.height; ++y) {
+    const float* in = &fine.values[static_cast<std::size_t>(y) * width];
+    for (std::size_t x = 0; x < half; ++x) {
+      row[x] = 0.75F * (in[2 * x] + in[2 * x + 1]);
+    }
+    if (width % 2 != 0) {
+      row[last] = 0.75F * in[width - 1];
+    }
+    for (std::size_t x = 1; x < half; ++x) {
+      row[x] += 0.25F * in[2 * x - 1];
+      row[x - 1] += 0.25F * in[2 * x];
+    }
+    row[0] += 0.25F * in[0];
+    if (width % 2 != 0) {
+      row[last] += half > 0 ? 0.25F * in[width - 2] : 0.0F;
+      row[half > 0 ? last - 1 : 0] += 0.25F * in[width - 1];
+    } else {
+      row[last] += 0.25F * in[width - 1];
+    }
+    const int beside = std::clamp(y / 2 + (y % 2 == 0 ? -1 : 1), 0, coarse.height - 1);
+    float* own = &coarse.values[static_cast<std::size_t>(y / 2) * row.size()];
+    float* other = &coarse.values[static_cast<std::size_t>(beside) * row.size()];
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      own[x] += 0.75F * row[x];
+    }
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      other[x] += 0.25F * row[x];
+    }
+  }
+}
+
+// fine += coarse, by the tent between the centres of its bins; constant beyond the rim.
+void AddGrown(const BinnedPicture& coarse, BinnedPicture& fine) {
+  const auto width = static_cast<std::size_t>(fine.width);
+  std::vector<float> row(static_cast<std::size_t>(coarse.width));
+  const std::size_t last = row.size() - 1;
+  for (int y = 0; y < fine.height; ++y) {
+    const int beside = std::clamp(y / 2 + (y % 2 == 0 ? -1 : 1), 0, coarse.height - 1);
+    const float* own = &coarse.values[static_cast<std::size_t>(y / 2) * row.size()];
+    const float* other = &coarse.values[static_cast<std::size_t>(beside) * row.size()];
+    for (std::size_t x = 0; x < row.size(); ++x) {
+      row[x] = 0.75F * own[x] + 0.25F * other[x];
+    }
+    float* out = &fine.values[static_cast<std::size_t>(y) * width];
+    for (std::size_t x = 0; x < width / 2; ++x) {
+      out[2 * x] += 0.75F * row[x] + 0.25F * row[x > 0 ? x - 1 : 0];
+      out[2 * x + 1] += 0.75F * row[x] + 0.25F * row[x < last ? x + 1 : last];
+    }
+    if (width % 2 != 0) {
+      out[width - 1] += 0.75F * row[last] + 0.25F * row[last > 0 ? last - 1 : 0];
+    }
+  }
+}
+
+}  // namespace
+
+void BinnedPicture::Fill(const std::vector<float>& picture, int picture_width) {
+  Halve(picture.data(),
+        picture_width,
+        static_cast<int>(picture.size()) / picture_width,
+        *this);
+}
+
+GlarePyramid::GlarePyramid(const calibrate::Glare& glare, int width_px, int height_px) {
+  if (glare.empty()) {
+    return;
+  }
+  // What is scattered farther than half a picture is spread too thin to matter.
+  const int reach_px = std::max(width_px, height_px) / 2;
+  const int side_px = std::min(width_px, height_px);
+  fraction_ = Sum(glare, reach_px);
+  for (double sigma = kBinsASigma * SideAt(0); sigma < 0.7 * reach_px;
+       sigma *= std::numbers::sqrt2) {
+    int level = 0;
+    while (kBinsASigma * SideAt(level + 1) <= sigma * 1.001 &&
+           side_px / SideAt(level + 1) >= kSmallestPicture) {
+      ++level;
+    }
+    gaussians_.push_back({sigma, 0.0, {}, level});
+    level_count_ = level + 1;
+  }
+  FitWeights(glare, reach_px);
+  for (Gaussian& gaussian : gaussians_) {
+    const double side = SideAt(gaussian.level);
+    const double variance =
+        (gaussian.sigma_px * gaussian.sigma_px - VarianceAdded(gaussian.level)) /
+        (side * side);
+    const int radius = static_cast<int>(std::ceil(3.5 * std::sqrt(variance)));
+    double sum = 0;
+    for (int t = -radius; t <= radius; ++t) {
+      sum += std::exp(-0.5 * t * t / variance);
+    }
+    for (int t = -radius; t <= radius; ++t) {
+      gaussian.taps.push_back(
+          static_cast<float>(std::exp(-0.5 * t * t / variance) / sum));
+    }
+  }
+}
+
+// In units of Σ C: (1 − g + K) ∗ C = K / (1 − g), solved by fixed-point steps, each of
+// which gains a factor g; the least squares fit of relative errors, an octave like any
+// other, keeps C a sum of the same Gaussians.
+void GlarePyramid::FitWeights(const calibrate::Glare& glare, double reach_px) {
+  const double hole_px = glare.radius_px.front();
+  const std::vector<double> radii = FitRadii(hole_px, reach_px);
+  const auto rows = static_cast<Eigen::Index>(radii.size());
+  const auto columns = static_cast<Eigen::Index>(gaussians_.size());
+  const double kept = 1 - fraction_;
+  const auto variance = [&](Eigen::Index k) {
+    return std::pow(gaussians_[static_cast<std::size_t>(k)].sigma_px, 2);
+  };
+  Eigen::MatrixXd shape(rows + 1, columns);
+  Eigen::VectorXd kernel(rows);
+  Eigen::VectorXd scale(rows);
+  for (Eigen::Index n = 0; n < rows; ++n) {
+    const double r = radii[static_cast<std::size_t>(n)];
+    const double next =
+        n + 1 < rows ? radii[static_cast<std::size_t>(n) + 1] : 1.06 * r;
+    const double edge = std::clamp(r, hole_px, reach_px);
+    scale[n] = std::sqrt((next - r) / edge) / glare.DensityAt(edge);
+    kernel[n] = r <= reach_px ? glare.DensityAt(r) : 0;
+    for (Eigen::Index k = 0; k < columns; ++k) {
+      shape(n, k) = scale[n] * Density(r * r, variance(k));
+    }
+  }
+  constexpr double kSumCounts = 0.1;
+  shape.row(rows).setConstant(kSumCounts / fraction_);
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> solver(shape);
+  const auto fit = [&](const Eigen::VectorXd& target, double sum) {
+    Eigen::VectorXd right(rows + 1);
+    right.head(rows) = scale.cwiseProduct(target);
+    right[rows] = kSumCounts / fraction_ * sum;
+    return Eigen::VectorXd(solver.solve(right));
+  };
+  const Eigen::VectorXd once = fit(kernel, fraction_);  // K
+  Eigen::VectorXd weights = once / (kept * kept);
+  constexpr int kSteps = 5;
+  for (int step = 0; step < kSteps; ++step) {
+    Eigen::VectorXd target = kernel / kept;
+    for (Eigen::Index n = 0; n < rows; ++n) {
+      const double r = radii[static_cast<std::size_t>(n)];
+      for (Eigen::Index a = 0; a < columns; ++a) {
+        for (Eigen::Index b = 0; b < columns; ++b) {
+          target[n] -= once[a] * weights[b] * Density(r * r, variance(a) + variance(b));
+        }
+      }
+    }
+    weights = fit(target / kept, fraction_ / kept);
+  }
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    gaussians_[static_cast<std::size_t>(k)].weight = weights[k];
+  }
+}
+
+void GlarePyramid::Convolve(int level,
+                            const BinnedPicture& sums,
+                            BinnedPicture& result) const {
+  const auto width = static_cast<std::size_t>(sums.width);
+  const auto height = static_cast<std::size_t>(sums.height);
+  const std::size_t stride = (width + kBlock - 1) / kBlock * kBlock;
+  std::fill(result.values.begin(), result.values.end(), 0.0F);
+  for (const Gaussian& gaussian : gaussians_) {
+    if (gaussian.level != level) {
+      continue;
+    }
+    const std::size_t radius = gaussian.taps.size() / 2;
+    // Rows with dark ones above and below.
+    std::vector<float> along((height + 2 * radius) * stride, 0.0F);
+    std::vector<float> line(stride + 2 * radius + kBlock, 0.0F);
+    for (std::size_t y = 0; y < height; ++y) {
+      std::copy_n(&sums.values[y * width], width, &line[radius]);
+      AddTaps(line.data(), 1, gaussian.taps, stride, &along[(y + radius) * stride]);
+    }
+    const auto scale = static_cast<float>(gaussian.weight / std::pow(SideAt(level), 2));
+    std::vector<float> row(stride);
+    for (std::size_t y = 0; y < height; ++y) {
+      std::fill(row.begin(), row.end(), 0.0F);
+      AddTaps(&along[y * stride], stride, gaussian.taps, stride, row.data());
+      for (std::size_t x = 0; x < width; ++x) {
+        result.values[y * width + x] += scale * row[x];
+      }
+    }
+  }
+}
+
+namespace {
+
+// Dark bins around a picture before it is shrunk: light that a coarse bin has beyond
+// the rim belongs to the slope at the rim.
+constexpr int kRim = 2;
+
+BinnedPicture WithRim(const BinnedPicture& picture) {
+  BinnedPicture padded =
+      BinnedPicture::OfSize(picture.width + 2 * kRim, picture.height + 2 * kRim);
+  for (int y = 0; y < picture.height; ++y) {
+    std::copy_n(
+        &picture.values[static_cast<std::size_t>(y * picture.width)],
+        picture.width,
+        &padded.values[static_cast<std::size_t>((y + kRim) * padded.width + kRim)]);
+  }
+  return padded;
+}
+
+void AddWithoutRim(const BinnedPicture& padded, BinnedPicture& picture) {
+  for (int y = 0; y < picture.height; ++y) {
+    const float* from =
+        &padded.values[static_cast<std::size_t>((y + kRim) * padded.width + kRim)];
+    float* to = &picture.values[static_cast<std::size_t>(y * picture.width)];
+    for (int x = 0; x < picture.width; ++x) {
+      to[x] += from[x];
+    }
+  }
+}
+
+}  // namespace
+
+BinnedPicture GlarePyramid::Scattered(BinnedPicture sums) const {
+  std::vector<BinnedPicture> levels;
+  levels.push_back(std::move(sums));
+  for (int level = 1; level < level_count_; ++level) {
+    const BinnedPicture finer = WithRim(levels.back());
+    BinnedPicture coarser(finer.width, finer.height);
+    Shrink(finer, coarser);
+    levels.push_back(std::move(coarser));
+  }
+  BinnedPicture result = levels.back();
+  for (int level = level_count_; level-- > 0;) {
+    BinnedPicture own = levels[static_cast<std::size_t>(level)];
+    Convolve(level, levels[static_cast<std::size_t>(level)], own);
+    if (level + 1 < level_count_) {
+      BinnedPicture grown =
+          BinnedPicture::OfSize(own.width + 2 * kRim, own.height + 2 * kRim);
+      AddGrown(result, grown);
+      AddWithoutRim(grown, own);
+    }
+    result = std::move(own);
+  }
+  return result;
+}
+
+}  // namespace nacre::reconstruct::internal
