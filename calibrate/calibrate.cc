@@ -14,6 +14,7 @@
 #include "core/provenance.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <utility>
 
@@ -138,10 +139,18 @@ Diagnostics DiagnosticsOf(const Foundation& f) {
 }
 
 // Farther from a spot than its own light reaches, pixels.
-double BeyondSpotPx(const Foundation& f) {
+double BeyondSpotPx(const acquire::SessionReader& session,
+                    const RatePictures& pictures,
+                    const Foundation& f) {
   // Spots are a pixel or two wide, whatever the sensor; somewhat more of a fine one.
   constexpr double kLeastPx = 4;
-  return kLeastPx + f.geometry.camera.width_px / 500.0;
+  const CameraGeometry& camera = f.geometry.camera;
+  const double pixel_mm =
+      std::sqrt(camera.FootprintMm2({0.5 * camera.width_px, 0.5 * camera.height_px}));
+  constexpr double kSigmas = 4.5;
+  return std::max(
+      kLeastPx + camera.width_px / 500.0,
+      kSigmas * SpotSigmaMm(session, camera, f.laser.map, pictures) / pixel_mm);
 }
 
 // Of the pictures used; the rest of the session doesn't matter, nor does when it was.
@@ -189,7 +198,7 @@ Calibration Calibrate(const acquire::SessionReader& session,
                     f.geometry.camera.PixelFromSample(
                         f.laser.map.SampleFromAngle(lattice[lattice.size() / 2])),
                     transfer.saturation_counts,
-                    BeyondSpotPx(f));
+                    BeyondSpotPx(session, pictures, f));
   corrections.glare = glare.glare;
   corrections.blooming = glare.blooming;
   pictures.SetGlare(glare.glare, width, height);

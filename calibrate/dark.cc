@@ -20,6 +20,7 @@ struct Lines {
   double n = 0;
   double t = 0;
   double tt = 0;
+  double longest = 0;      // exposure
   std::vector<double> c;   // a pixel
   std::vector<double> tc;  // a pixel
 
@@ -27,6 +28,7 @@ struct Lines {
     c.resize(frame.counts.size(), 0.0);
     tc.resize(frame.counts.size(), 0.0);
     n += 1;
+    longest = std::max(longest, frame.exposure_us);
     t += frame.exposure_us;
     tt += frame.exposure_us * frame.exposure_us;
     for (std::size_t k = 0; k < c.size(); ++k) {
@@ -72,6 +74,7 @@ double Median(std::vector<double> values) {
 }
 
 // Hot pixels, and mean and spread of the others' slopes and offsets.
+// What is less than a count in the longest exposure is none of a converter's business.
 void SortPixels(const Lines& lines, double noise_slope, DarkResult& result) {
   const std::size_t count = lines.c.size();
   std::vector<double> slopes(count);
@@ -87,11 +90,14 @@ void SortPixels(const Lines& lines, double noise_slope, DarkResult& result) {
   const double scatter =
       std::max(kPerMedianDeviation * Median(deviations), noise_slope);
   constexpr double kFarOff = 5;
+  constexpr double kLeastCounts = 1;
+  const double limit =
+      middle + std::max(kFarOff * scatter, kLeastCounts / lines.longest);
   double n = 0;
   double slope = 0;
   double offset = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    if (slopes[k] - middle <= kFarOff * scatter) {
+    if (slopes[k] <= limit) {
       n += 1;
       slope += slopes[k];
       offset += lines.Offset(k);
@@ -100,7 +106,7 @@ void SortPixels(const Lines& lines, double noise_slope, DarkResult& result) {
   slope /= n;
   double square = 0;
   for (std::size_t k = 0; k < count; ++k) {
-    if (slopes[k] - middle <= kFarOff * scatter) {
+    if (slopes[k] <= limit) {
       square += (slopes[k] - slope) * (slopes[k] - slope) / n;
     } else {
       result.hot_pixels.push_back({static_cast<std::int32_t>(k), slopes[k] - slope});

@@ -18,8 +18,8 @@ struct DarkResult {
 };
 
 /// A line over the exposures through every pixel's mean counts; a pixel is hot if its
-/// slope lies five standard deviations off. The variances are those of pairs, in which
-/// all that is fixed cancels.
+/// slope lies five standard deviations off, and a count in the longest exposure. The
+/// variances are those of pairs, in which all that is fixed cancels.
 DarkResult EstimateDarkMaps(const acquire::SessionReader& session);
 
 /// Smooth ambient light, counts per µs, of the pictures with the laser off: pose 0 the

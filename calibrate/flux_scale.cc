@@ -16,9 +16,7 @@ namespace {
 using acquire::Frame;
 using internal::SpotSums;
 
-// The disc over which a spot's light is summed: wide enough for the skirts of any spot
-// that the lattice keeps apart, and no wider, since each pixel adds its read noise.
-double SpotReachMm(const std::vector<PointMm>& spots) {
+double ClosestMm(const std::vector<PointMm>& spots) {
   double closest_mm = HUGE_VAL;
   for (std::size_t a = 0; a < spots.size(); ++a) {
     for (std::size_t b = 0; b < a; ++b) {
@@ -26,7 +24,7 @@ double SpotReachMm(const std::vector<PointMm>& spots) {
           closest_mm, std::hypot(spots[a].x - spots[b].x, spots[a].y - spots[b].y));
     }
   }
-  return 0.35 * closest_mm;
+  return closest_mm;
 }
 
 // Is the disc wholly in the picture?
@@ -62,13 +60,21 @@ void RequireUnsaturated(const acquire::SessionReader& session,
 // What is summed up over the pictures of a channel.
 struct ChannelSums {
   internal::SpotPowers powers;
-  std::vector<float> mean;  // picture
+  std::vector<float> mean;     // picture
+  std::vector<float> one_way;  // of those that visit the lattice in its order
   double exposure_us = 0;
 };
 
 double Mean(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0) /
          static_cast<double>(values.size());
+}
+
+void AddTo(std::vector<float>& sum, const std::vector<float>& rates) {
+  sum.resize(rates.size(), 0.0F);
+  for (std::size_t k = 0; k < rates.size(); ++k) {
+    sum[k] += rates[k];
+  }
 }
 
 // The pictures of one channel.
@@ -78,6 +84,7 @@ ChannelSums ReadChannel(const acquire::SessionReader& session,
                         const PhotonTransfer& transfer,
                         int channel) {
   ChannelSums sums;
+  const bool reversed = session.rig().targets.reverse_lattice;
   for (const std::int64_t number :
        internal::PicturesOf(session, acquire::Target::kReference, channel)) {
     const Frame frame = session.ReadFrame(number);
@@ -89,17 +96,24 @@ ChannelSums ReadChannel(const acquire::SessionReader& session,
         transfer.saturation_counts);
     const std::vector<float> rates = pictures.Rates(frame, channel);
     sums.exposure_us = frame.exposure_us;
-    sums.mean.resize(rates.size(), 0.0F);
-    for (std::size_t k = 0; k < rates.size(); ++k) {
-      sums.mean[k] += rates[k];
+    AddTo(sums.mean, rates);
+    // The mirrors' hysteresis moves the spots between the two ways round.
+    if (!reversed || session.schedule()[number].repeat % 2 == 0) {
+      AddTo(sums.one_way, rates);
     }
     sums.powers.pictures.push_back(spots.Of(rates));
   }
   for (float& value : sums.mean) {
     value /= static_cast<float>(sums.powers.pictures.size());
   }
+  const int width = session.manifest().camera.width;
+  const double row = pictures.dark().row_noise_counts / sums.exposure_us;
   const std::vector<double> variances = spots.Variances(
-      sums.mean, sums.exposure_us, pictures.dark(), transfer.gain_electrons_per_count);
+      pictures.Variances(
+          sums.mean,
+          {.channel = channel, .exposure_us = sums.exposure_us, .width_px = width},
+          transfer.gain_electrons_per_count),
+      row * row);
   const std::vector<double> means = spots.Of(sums.mean);
   const auto n = static_cast<double>(means.size());
   const double mean = Mean(means);
@@ -118,16 +132,37 @@ struct Discs {
   std::vector<PointMm> spots;
   double reach_mm = 0;
   double core_mm = 0;
+  double pixel_mm = 0;
 };
+
+// A spot between the pixels of one colour is seen brighter or darker than it is: the
+// sum over pixels 2 apart varies by 2 m cos(π x) along each axis, m what spot and pixel
+// leave of half a cycle a pixel. Green ones lie closer, on a diagonal.
+double SamplingVariance(std::size_t planes, const SpotProfile& spot, double pixel_mm) {
+  if (planes == 0) {
+    return 0;
+  }
+  const double sigma2_px2 = 0.5 * (spot.xx_mm2 + spot.yy_mm2) / (pixel_mm * pixel_mm);
+  const double cycles2 = planes == 1 ? 0.25 : 0.5;
+  const double pi = std::numbers::pi;
+  const double m = 2 / pi * std::exp(-2 * pi * pi * cycles2 * sigma2_px2);
+  return 4 * m * m;
+}
 
 Discs DiscsOf(const acquire::SessionReader& session,
               const CameraGeometry& camera,
-              const acquire::ScanMap& map) {
+              const acquire::ScanMap& map,
+              double spot_sigma_mm) {
   Discs discs;
   for (const acquire::ScanAngle& angle : session.schedule().lattice()) {
     discs.spots.push_back(map.SampleFromAngle(angle));
   }
-  discs.reach_mm = SpotReachMm(discs.spots);
+  const double closest_mm = ClosestMm(discs.spots);
+  constexpr double kUsual = 0.35;  // wide enough for the skirts of most spots
+  constexpr double kMost = 0.49;   // discs hardly touch
+  constexpr double kWholeSpot = 4.5;
+  discs.reach_mm =
+      std::clamp(kWholeSpot * spot_sigma_mm, kUsual * closest_mm, kMost * closest_mm);
   std::erase_if(discs.spots, [&](const PointMm& spot) {
     return !InView(camera, spot, discs.reach_mm);
   });
@@ -136,12 +171,39 @@ Discs DiscsOf(const acquire::SessionReader& session,
                   ": no spot of the laser lattice is wholly in view");
   }
   constexpr double kCorePx = 5;
-  discs.core_mm =
-      kCorePx * std::sqrt(camera.FootprintMm2(camera.PixelFromSample(discs.spots[0])));
+  discs.pixel_mm =
+      std::sqrt(camera.FootprintMm2(camera.PixelFromSample(discs.spots[0])));
+  discs.core_mm = std::min(
+      std::max(kWholeSpot * spot_sigma_mm, kCorePx * discs.pixel_mm), discs.reach_mm);
   return discs;
 }
 
 }  // namespace
+
+double SpotSigmaMm(const acquire::SessionReader& session,
+                   const CameraGeometry& camera,
+                   const acquire::ScanMap& map,
+                   const RatePictures& pictures) {
+  const internal::PixelGround ground = internal::MapPixels(camera);
+  const Discs discs = DiscsOf(session, camera, map, 0);
+  double widest_mm = 0;
+  for (int channel = 0; channel < session.rig().ChannelCount(); ++channel) {
+    const SpotSums sums(ground,
+                        pictures.Shares(channel, camera.width_px, camera.height_px),
+                        discs.spots,
+                        discs.reach_mm,
+                        discs.core_mm);
+    const Frame frame = session.ReadFrame(
+        internal::PicturesOf(session, acquire::Target::kReference, channel).front());
+    constexpr double kWithinRoot2Sigma = 0.632;
+    widest_mm = std::max(
+        widest_mm,
+        sums.RadiusMm(
+            ground, discs.spots, pictures.Rates(frame, channel), kWithinRoot2Sigma) /
+            std::numbers::sqrt2);
+  }
+  return widest_mm;
+}
 
 FluxResult EstimateFluxScales(const acquire::SessionReader& session,
                               const CameraGeometry& camera,
@@ -149,7 +211,8 @@ FluxResult EstimateFluxScales(const acquire::SessionReader& session,
                               const RatePictures& pictures,
                               const PhotonTransfer& transfer) {
   const internal::PixelGround ground = internal::MapPixels(camera);
-  const Discs discs = DiscsOf(session, camera, map);
+  const Discs discs =
+      DiscsOf(session, camera, map, SpotSigmaMm(session, camera, map, pictures));
   const acquire::TargetsDescription& targets = session.rig().targets;
   const std::vector<std::string>& names = session.rig().scanner.channels;
   const std::size_t ways =
@@ -162,7 +225,7 @@ FluxResult EstimateFluxScales(const acquire::SessionReader& session,
                         discs.spots,
                         discs.reach_mm,
                         discs.core_mm);
-    const ChannelSums read = ReadChannel(session, sums, pictures, transfer, channel);
+    ChannelSums read = ReadChannel(session, sums, pictures, transfer, channel);
     const double mean = Mean(sums.Of(read.mean));
     if (!(mean > 0)) {
       throw BadData(fmt::format("{}: channel {} is dark on the reference target",
@@ -177,7 +240,9 @@ FluxResult EstimateFluxScales(const acquire::SessionReader& session,
          .flux_scale_spread = spread,
          .flux_scale_sigma =
              spread / std::sqrt(static_cast<double>(discs.spots.size()))});
-    result.spots.push_back(sums.Profile(ground, read.mean));
+    result.spots.push_back(sums.Profile(ground, read.one_way));
+    read.powers.sampling = SamplingVariance(
+        pictures.PlaneCount(channel), result.spots.back(), discs.pixel_mm);
     light_noise.Add(read.powers, ways);
   }
   result.light_noise = light_noise.Result();

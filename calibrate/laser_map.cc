@@ -261,13 +261,17 @@ Matches FindLattice(const acquire::SessionReader& session,
     throw BadData(fmt::format(
         "{}: the {} x {} laser spots on the reference target can't be {} in channel "
         "{}; see that all are in view and bright (targets.reference_exposure_us), and "
-        "that scanner.mm_per_rad is right",
+        "that scanner.mm_per_rad is right{}",
         (session.folder() / session.Entry(number).file).string(),
         session.rig().targets.laser_lattice,
         session.rig().targets.laser_lattice,
         observed.empty() ? "made out" : "told apart",
         session.rig().scanner.channels[static_cast<std::size_t>(
-            session.schedule()[number].channel)]));
+            session.schedule()[number].channel)],
+        session.manifest().camera.mosaic.empty()
+            ? ""
+            : "; between the pixels of one colour a sharp spot is lost: it must be two "
+              "pixels wide, by itself or by a little defocus"));
   }
   return matches;
 }

@@ -15,7 +15,8 @@ std::array<double, 3> LaserShares(const ColourFilters& filters, int channel) {
   return filters.lasers.at(static_cast<std::size_t>(channel));
 }
 
-// Multiplies every pixel by the value of its colour.
+}  // namespace
+
 void ScaleColours(const std::string& mosaic,
                   const std::array<double, 3>& values,
                   int width_px,
@@ -33,8 +34,6 @@ void ScaleColours(const std::string& mosaic,
     }
   }
 }
-
-}  // namespace
 
 std::vector<MosaicPlane> PlanesOf(const std::string& mosaic) {
   if (!acquire::IsMosaic(mosaic)) {

@@ -40,6 +40,12 @@ inline double PlaneAperture(const MosaicPlane& plane) {
   return 1.0 / plane.step;
 }
 
+/// Multiplies every pixel by the value of its colour.
+void ScaleColours(const std::string& mosaic,
+                  const std::array<double, 3>& values,
+                  int width_px,
+                  std::vector<float>& picture);
+
 /// Divides each pixel by what its colour is of the strongest. Nothing without a mosaic.
 void Balance(const std::string& mosaic,
              const std::array<double, 3>& shares,

@@ -33,6 +33,13 @@ struct FluxResult {
   LightNoise light_noise;
 };
 
+/// A round figure of the widest channel's spot on the reference, lens included: its
+/// standard deviation, were it Gaussian.
+double SpotSigmaMm(const acquire::SessionReader& session,
+                   const CameraGeometry& camera,
+                   const acquire::ScanMap& map,
+                   const RatePictures& pictures);
+
 /// The flux scale of every channel, see ChannelResponse, from the pictures of the
 /// reference target, and what the spots there say of the laser: their shape; their
 /// power's ripple, from one picture to the next; speckle, from one spot to the next

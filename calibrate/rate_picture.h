@@ -10,6 +10,13 @@
 
 namespace nacre::calibrate {
 
+/// How a picture was taken.
+struct Lighting {
+  int channel = 0;
+  double exposure_us = 0;
+  int width_px = 0;
+};
+
 /// What turns a picture of the reference into count rates proportional to radiance, as
 /// far as it is known yet.
 class RatePictures {
@@ -23,10 +30,19 @@ class RatePictures {
   void SetFlatField(const SmoothField& flat, int width, int height);
   void SetGlare(const Glare& glare, int width, int height);
 
-  /// Counts per µs of a picture that this laser lit, hot pixels filled in, ambient
+  /// Counts per µs of a picture that this laser lit, hot pixels put right, ambient
   /// light and glare taken off, divided by the flat field. A mosaic's is filled in (see
   /// mosaic.h): `Shares` tells which pixels really saw it.
   std::vector<float> Rates(const acquire::Frame& frame, int channel) const;
+  /// Variances of what Rates() gives, for mean rates like these: photons of all light
+  /// that falls on a pixel, glare as well, and the dark's noise.
+  std::vector<double> Variances(const std::vector<float>& rates,
+                                const Lighting& lighting,
+                                double gain_electrons_per_count) const;
+  /// Of a mosaic's planes those that see that laser; 0 of a monochrome sensor.
+  std::size_t PlaneCount(int channel) const {
+    return filters_.mosaic.empty() ? 0 : SharesOf(filters_, channel).size();
+  }
   std::vector<float> Shares(int channel, int width, int height) const {
     return PixelShares(filters_, channel, width, height);
   }
@@ -41,6 +57,7 @@ class RatePictures {
   std::vector<float> ambient_;
   std::vector<float> flat_;
   std::unique_ptr<GlareFilter> glare_;
+  double kept_ = 1;  // of a point's light, by what glare leaves it
 };
 
 }  // namespace nacre::calibrate

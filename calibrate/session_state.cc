@@ -41,6 +41,12 @@ std::vector<std::int64_t> ShortPictures(const acquire::SessionReader& session) {
   return some;
 }
 
+double PixelMm(const Calibration& calibration) {
+  const CameraGeometry& camera = calibration.camera;
+  return std::sqrt(
+      camera.FootprintMm2({0.5 * camera.width_px, 0.5 * camera.height_px}));
+}
+
 void Warn(const SessionState& state, double across_px, std::vector<Warning>& warnings) {
   if (state.has_patch &&
       std::abs(state.drift_per_hour) > 4 * state.drift_sigma_per_hour &&
@@ -99,6 +105,9 @@ SessionState ExamineSession(const acquire::SessionReader& session,
   pictures.SetAmbient(calibration.corrections.ambient,
                       calibration.camera.width_px,
                       calibration.camera.height_px);
+  pictures.SetFlatField(calibration.corrections.flat_field,
+                        calibration.camera.width_px,
+                        calibration.camera.height_px);
   std::vector<internal::Sighting> sightings;
   std::vector<internal::PatchSample> patch;
   const std::vector<std::int64_t> numbers = ShortPictures(session);
@@ -123,7 +132,18 @@ SessionState ExamineSession(const acquire::SessionReader& session,
   for (const internal::Sighting& s : sightings) {
     across_px += s.across_px / static_cast<double>(sightings.size());
   }
+  double slope = 0;  // between beams and lines of sight, the mean
+  for (const internal::Sighting& s : sightings) {
+    slope += s.px_per_mm * PixelMm(calibration) / static_cast<double>(sightings.size());
+  }
   state.plane = internal::FitPlane(std::move(sightings), state.spots_used);
+  // A camera that leans otherwise than it was calibrated to sees every shift as another
+  // height; how it leans is known as well as its principal point is.
+  const CameraGeometry& camera = calibration.camera;
+  state.plane.height_sigma_mm =
+      std::hypot(state.plane.height_sigma_mm,
+                 state.plane.height_mm * calibration.centre_sigma_px / camera.fx_px /
+                     std::max(slope, 1e-3));
   internal::FitDrift(session, patch, state);
   Warn(state, across_px, state.warnings);
   return state;

@@ -157,6 +157,15 @@ void WarnOfLaser(const Calibration& calibration,
                            "scale may be off by per cents. Is the lens in focus?",
                            calibration.channels[k].name,
                            longer / pixel_mm));
+    constexpr double kNarrow = 0.4;  // of a plane's pixels: 5 % of its light by chance
+    list.AddIf(
+        !c.filters.mosaic.empty() && shorter < kNarrow * 2 * pixel_mm,
+        "undersampled-spot",
+        fmt::format("the spot of channel {} has a standard deviation of {:.2f} pixels: "
+                    "between those of one colour part of it is lost, and the flux "
+                    "scale may be off by per cents. Widen it, or defocus a little",
+                    calibration.channels[k].name,
+                    shorter / pixel_mm));
     list.AddIf(longer > 1.15 * shorter && half > 4 * s.sigma_mm2,
                "long-spot",
                fmt::format("the spot of channel {} isn't round: {:.3f} by {:.3f} mm "

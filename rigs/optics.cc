@@ -126,6 +126,23 @@ int ShrinkFactor(double sigma_px) {
   return factor;
 }
 
+// The mean along the picture's rim.
+float RimMean(const std::vector<float>& picture, int width, int height) {
+  double sum = 0;
+  const auto add = [&](int x, int y) {
+    sum += static_cast<double>(picture[static_cast<std::size_t>(y * width + x)]);
+  };
+  for (int x = 0; x < width; ++x) {
+    add(x, 0);
+    add(x, height - 1);
+  }
+  for (int y = 1; y + 1 < height; ++y) {
+    add(0, y);
+    add(width - 1, y);
+  }
+  return static_cast<float>(sum / (2.0 * width + 2.0 * (height - 2)));
+}
+
 }  // namespace
 
 Optics::Optics(const OpticsModel& model, int width_px, int height_px, int thread_count)
@@ -167,8 +184,13 @@ void Optics::Apply(std::vector<float>& picture) const {
   if (model_.defocus_sigma_px <= 0 && halos_.empty()) {
     return;
   }
+  // A card or a lit room goes on beyond the picture: blur and scatter what differs from
+  // the rim.
+  const float ground = RimMean(picture, width_, height_);
   Picture sharp(width_, height_);
-  sharp.values = picture;
+  for (std::size_t k = 0; k < picture.size(); ++k) {
+    sharp.values[k] = picture[k] - ground;
+  }
   Picture result = model_.defocus_sigma_px > 0
                        ? Blur(sharp, model_.defocus_sigma_px, thread_count_)
                        : sharp;
@@ -188,7 +210,9 @@ void Optics::Apply(std::vector<float>& picture) const {
              halo.weight,
              result);
   }
-  picture = std::move(result.values);
+  for (std::size_t k = 0; k < picture.size(); ++k) {
+    picture[k] = result.values[k] + ground;
+  }
 }
 
 double Optics::GlareDensity(double distance_px) const {

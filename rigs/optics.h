@@ -29,8 +29,8 @@ struct OpticsModel {
 
 /// Veiling glare is a sum of Gaussian halos, each twice as wide as the one before, up
 /// to a quarter of the picture: density falls as r^−(2 + falloff), as it does of dusty
-/// lenses. A halo is blurred at a resolution that its width allows; light that leaves
-/// the picture is lost.
+/// lenses. A halo is blurred at a resolution that its width allows. Beyond the picture
+/// the scene is taken to be what it is along the rim, on the average.
 class Optics {
  public:
   Optics(const OpticsModel& model, int width_px, int height_px, int thread_count = 0);

@@ -4,6 +4,21 @@
 
 namespace nacre::calibrate::internal {
 
+namespace {
+
+constexpr double kRingPx = 1.5;  // width of the ring
+
+}  // namespace
+
+double DiscShare(double radius_px, double spot_sigma_px) {
+  const double outer = radius_px + kRingPx;
+  const double two_sigma2 = 2 * spot_sigma_px * spot_sigma_px;
+  const double beyond = std::exp(-radius_px * radius_px / two_sigma2);
+  const double on_ring = beyond - std::exp(-outer * outer / two_sigma2);
+  const double areas = radius_px * radius_px / (outer * outer - radius_px * radius_px);
+  return 1 - beyond - on_ring * areas;
+}
+
 Disc SumDisc(const acquire::Frame& frame,
              const std::vector<float>& rates,
              const Calibration& calibration,
@@ -31,7 +46,7 @@ Disc SumDisc(const acquire::Frame& frame,
         const auto k = static_cast<std::size_t>(y * frame.width + x);
         const double r = std::hypot(x - about.x, y - about.y);
         const auto rate = static_cast<double>(rates[k]);
-        if (pass == 0 && r > radius_px && r <= radius_px + 1.5) {
+        if (pass == 0 && r > radius_px && r <= radius_px + kRingPx) {
           ring.push_back(rate);
         }
         if (pass == 1 && r <= radius_px) {

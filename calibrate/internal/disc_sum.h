@@ -20,6 +20,10 @@ Disc SumDisc(const acquire::Frame& frame,
              PixelPoint about,
              double radius_px);
 
+/// The share of a round Gaussian spot that SumDisc finds: the ring takes some as
+/// ground.
+double DiscShare(double radius_px, double spot_sigma_px);
+
 /// The centre of gravity of a peak that goes on into the sample's glow; none if it
 /// saturates or can't be found near there.
 std::optional<PixelPoint> PeakCentre(const acquire::Frame& frame,

@@ -61,8 +61,8 @@ void LightNoiseSums::Add(const SpotPowers& powers, std::size_t ways) {
     ripple2_ += ripple2;
     ripple2_variance_ += 2 * scatter.variance * scatter.variance / scatter.freedom;
   }
-  const double lasting =
-      powers.spread * powers.spread - (powers.noise + std::max(0.0, ripple2)) / frames;
+  const double lasting = powers.spread * powers.spread - powers.sampling -
+                         (powers.noise + std::max(0.0, ripple2)) / frames;
   speckle2_ += lasting * powers.pixels_a_spot * static_cast<double>(ways);
   channels_ += 1;
 }

@@ -12,6 +12,7 @@ struct SpotPowers {
   std::vector<std::vector<double>> pictures;  ///< Σ rate · footprint of each spot
   double noise = 0;          ///< relative variance of one of those, the sensor's own
   double spread = 0;         ///< of the spots' means, relative
+  double sampling = 0;       ///< relative variance that a mosaic's gaps add to it
   double pixels_a_spot = 1;  ///< over so many its light is spread
 };
 

@@ -3,6 +3,7 @@
 #include "calibrate/internal/disc_sum.h"
 #include "calibrate/internal/pictures.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -28,6 +29,8 @@ std::optional<PatchSample> LookAtPatch(const acquire::SessionReader& session,
                                        std::int64_t number) {
   const acquire::TargetsDescription& targets = session.rig().targets;
   constexpr double kRadiusPx = 4.5;
+  const double pixel_mm2 = calibration.camera.FootprintMm2(
+      calibration.camera.PixelFromSample(*targets.patch_mm));
   const Disc disc = SumDisc(frame,
                             rates,
                             calibration,
@@ -37,9 +40,16 @@ std::optional<PatchSample> LookAtPatch(const acquire::SessionReader& session,
     return std::nullopt;
   }
   const auto channel = static_cast<std::size_t>(session.schedule()[number].channel);
+  double share = 1;
+  if (channel < calibration.corrections.spots.size()) {
+    const SpotProfile& spot = calibration.corrections.spots[channel];
+    const double sigma_mm =
+        std::sqrt(0.5 * std::max(0.0, spot.xx_mm2 + spot.yy_mm2) + pixel_mm2 / 12);
+    share = DiscShare(kRadiusPx, sigma_mm / std::sqrt(pixel_mm2));
+  }
   return PatchSample{
       .hours = static_cast<double>(session.Entry(number).timestamp_ns) / 3.6e12,
-      .flux = disc.sum * std::numbers::pi / targets.patch_reflectance /
+      .flux = disc.sum / share * std::numbers::pi / targets.patch_reflectance /
               calibration.channels[channel].flux_scale_counts_mm2_sr_per_us};
 }
 

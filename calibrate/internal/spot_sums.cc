@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace nacre::calibrate::internal {
 
@@ -61,23 +62,17 @@ std::vector<double> SpotSums::Of(const std::vector<float>& rates) const {
   return sums;
 }
 
-std::vector<double> SpotSums::Variances(const std::vector<float>& rates,
-                                        double exposure_us,
-                                        const DarkResult& dark,
-                                        double gain) const {
+std::vector<double> SpotSums::Variances(const std::vector<double>& pixels,
+                                        double row) const {
   std::vector<double> variances(spot_count_, 0.0);
   std::vector<double> row_areas(spot_count_, 0.0);
   std::vector<std::size_t> rows(spot_count_, 0);
-  const double per_us2 = 1 / (exposure_us * exposure_us);
-  const double row2 = dark.row_noise_counts * dark.row_noise_counts * per_us2;
   const auto end_row = [&](std::size_t spot) {
-    variances[spot] += row2 * row_areas[spot] * row_areas[spot];
+    variances[spot] += row * row_areas[spot] * row_areas[spot];
     row_areas[spot] = 0;
   };
   for (const Member& member : members_) {  // row by row
-    const double counts = static_cast<double>(rates[member.pixel]) * exposure_us;
-    variances[member.spot] += (std::max(0.0, counts) / gain + dark.variance_counts2) *
-                              member.area_mm2 * member.area_mm2 * per_us2;
+    variances[member.spot] += pixels[member.pixel] * member.area_mm2 * member.area_mm2;
     if (rows[member.spot] != member.pixel / width_) {
       end_row(member.spot);
       rows[member.spot] = member.pixel / width_;
@@ -103,6 +98,34 @@ double SpotSums::PixelsASpot(const std::vector<float>& rates) const {
     mean += sums[s] * sums[s] / squares[s] / static_cast<double>(spot_count_);
   }
   return mean;
+}
+
+double SpotSums::RadiusMm(const PixelGround& ground,
+                          const std::vector<PointMm>& spots,
+                          const std::vector<float>& rates,
+                          double share) const {
+  std::vector<std::pair<double, double>> light;  // by radius²
+  double total = 0;
+  double area_mm2 = 0;
+  for (const Member& member : members_) {
+    const PointMm& p = ground.centre[member.pixel];
+    const PointMm& s = spots[member.spot];
+    const double w = static_cast<double>(rates[member.pixel]) * member.area_mm2;
+    light.emplace_back((p.x - s.x) * (p.x - s.x) + (p.y - s.y) * (p.y - s.y), w);
+    total += w;
+    area_mm2 += ground.area_mm2[member.pixel] / static_cast<double>(members_.size());
+  }
+  std::sort(light.begin(), light.end());
+  double sum = 0;
+  for (const auto& [radius2, w] : light) {
+    sum += w;
+    if (sum >= share * total) {
+      // Of a round Gaussian r² = −2 σ² ln(1 − share); a pixel's σ² is area / 12.
+      const double pixel2 = -2 * std::log1p(-share) * area_mm2 / 12;
+      return std::sqrt(std::max(0.0, radius2 - pixel2));
+    }
+  }
+  return 0;
 }
 
 namespace {

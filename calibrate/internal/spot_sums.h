@@ -1,7 +1,6 @@
 #pragma once
 
 #include "calibrate/calibration.h"
-#include "calibrate/dark.h"
 
 #include <cstddef>
 #include <vector>
@@ -30,12 +29,9 @@ class SpotSums {
   /// Σ rate · footprint of one picture for each spot.
   std::vector<double> Of(const std::vector<float>& rates) const;
 
-  /// The variance of those sums from the pixels' own noise, and from what the pixels of
+  /// The variance of those sums from the pixels' own, and from that which the pixels of
   /// a row have in common.
-  std::vector<double> Variances(const std::vector<float>& rates,
-                                double exposure_us,
-                                const DarkResult& dark,
-                                double gain) const;
+  std::vector<double> Variances(const std::vector<double>& pixels, double row) const;
 
   /// Over how many pixels a spot's light is spread, as averages of speckle go:
   /// (Σ w)² / Σ w². The mean over spots.
@@ -45,7 +41,12 @@ class SpotSums {
   /// the standard uncertainty of that from their scatter.
   SpotProfile Profile(const PixelGround& ground, const std::vector<float>& rates) const;
 
-  std::size_t spot_count() const { return spot_count_; }
+  /// The radius that holds that share of the light around the spots, all taken
+  /// together, less what a pixel's own width adds in squares. Tails hardly move it.
+  double RadiusMm(const PixelGround& ground,
+                  const std::vector<PointMm>& spots,
+                  const std::vector<float>& rates,
+                  double share) const;
 
  private:
   struct Member {
