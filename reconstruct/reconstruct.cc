@@ -56,13 +56,14 @@ void CheckSameRig(const acquire::SessionReader& session,
                     calibration.camera.width_px,
                     calibration.camera.height_px));
   }
-  if (!manifest.camera.mosaic.empty()) {
-    throw BadData(
-        fmt::format("{}: pictures in colour ({}) aren't reconstructed: capture in a "
-                    "monochrome pixel "
-                    "format, a laser channel at a time",
-                    session.folder().string(),
-                    manifest.camera.mosaic));
+  if (calibration.corrections.filters.mosaic != manifest.camera.mosaic) {
+    throw BadData(fmt::format(
+        "{}: its pictures' colours are '{}', those of the calibration's '{}'; calibrate "
+        "this session (pictures of three counts a pixel can't be: capture in a Bayer "
+        "or monochrome pixel format)",
+        session.folder().string(),
+        manifest.camera.mosaic,
+        calibration.corrections.filters.mosaic));
   }
   if (std::ssize(calibration.channels) != session.rig().ChannelCount()) {
     throw BadData(fmt::format("{}: {} laser channels, the calibration has {}",
@@ -271,7 +272,9 @@ internal::Gloss LookForGloss(const acquire::SessionReader& session,
                              const calibrate::SamplePlane& plane,
                              const GroupReader& reader,
                              const ReconstructOptions& options) {
-  if (!options.remove_gloss || options.specular_radius_cells >= 0) {
+  // It is looked for pixel by pixel, and a mosaic has gaps.
+  if (!options.remove_gloss || options.specular_radius_cells >= 0 ||
+      !calibration.corrections.filters.mosaic.empty()) {
     return {};
   }
   constexpr int kGroups = 12;

@@ -26,18 +26,6 @@ std::vector<std::vector<std::int64_t>> FindPictures(
   return pictures;
 }
 
-std::vector<float> InverseFlat(const calibrate::Calibration& calibration) {
-  const calibrate::SmoothField& flat = calibration.corrections.flat_field;
-  std::vector<float> inverse;
-  if (!flat.empty()) {
-    inverse = flat.Map(calibration.camera.width_px, calibration.camera.height_px);
-    for (float& value : inverse) {
-      value = 1 / value;
-    }
-  }
-  return inverse;
-}
-
 bool IsIdeal(const calibrate::SamplePlane& plane) {
   return plane.height_mm == 0 && plane.slope_x == 0 && plane.slope_y == 0;
 }
@@ -79,28 +67,17 @@ GroupReader::GroupReader(const acquire::SessionReader& session,
       calibration_(calibration),
       state_(state),
       header_(header),
-      weights_(CellLattice(header),
-               calibration.camera,
-               spot,
-               thread_count,
-               {.place = WhereLit(calibration, state.plane),
-                .factor = InverseFlat(calibration),
-                .with_bins = !calibration.corrections.glare.empty()}),
-      shift_(CellLattice(header),
-             calibration.camera,
-             OnPlane(calibration, state.plane),
-             header,
-             BeamOffsets(session, calibration, header)),
-      pictures_(FindPictures(session)),
-      glare_(calibration.corrections.glare,
-             calibration.camera.width_px,
-             calibration.camera.height_px) {
+      pictures_(FindPictures(session)) {
+  AddPlanes({.spot = spot,
+             .place = WhereLit(calibration, state.plane),
+             .on_surface = OnPlane(calibration, state.plane),
+             .beam_offsets = BeamOffsets(session, calibration, header)},
+            thread_count);
   const calibrate::Glare& glare = calibration.corrections.glare;
   if (glare.fraction > 0) {
     glare_sigma_ = static_cast<float>(
         std::hypot(glare.fraction_sigma / glare.fraction, GlarePyramid::kError));
   }
-  TakeAmbient();
   // RdPerRate is a product of what depends on x_i and what depends on x_o.
   const double at_origin = calibration.RdPerRate(0, {0, 0}, {0, 0}, header.eta);
   exit_factor_.reserve(static_cast<std::size_t>(lattice().CellCount()));
@@ -172,37 +149,58 @@ double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
          (count > 0 ? count / flux : 1);
 }
 
-// Ambient light is the same in all pictures: what it is in the cells.
-void GroupReader::TakeAmbient() {
-  const calibrate::SmoothField& ambient = calibration_.corrections.ambient;
-  if (ambient.empty()) {
-    return;
+void GroupReader::AddPlanes(const SurfaceModel& surface, int thread_count) {
+  const calibrate::ColourFilters& filters = calibration_.corrections.filters;
+  std::vector<calibrate::MosaicPlane> added;
+  for (int channel = 0; channel < std::ssize(header_.channels); ++channel) {
+    std::vector<Part> parts;
+    for (const calibrate::PlaneShare& share : SharesOf(filters, channel)) {
+      const calibrate::MosaicPlane& plane = share.plane;
+      const auto known = std::find_if(added.begin(), added.end(), [&](const auto& p) {
+        return p.column == plane.column && p.row == plane.row;
+      });
+      const double sees = filters.mosaic.empty()
+                              ? 1
+                              : filters.lasers[static_cast<std::size_t>(channel)]
+                                              [static_cast<std::size_t>(plane.colour)];
+      parts.push_back({static_cast<std::size_t>(known - added.begin()),
+                       static_cast<float>(share.weight / sees)});
+      if (known == added.end()) {
+        added.push_back(plane);
+        planes_.emplace_back(calibration_, plane, header_, surface, thread_count);
+      }
+    }
+    parts_.push_back(std::move(parts));
   }
-  const auto cells = static_cast<std::size_t>(lattice().CellCount());
-  RateFrame frame;
-  frame.rate = ambient.Map(calibration_.camera.width_px, calibration_.camera.height_px);
-  frame.variance.assign(frame.rate.size(), 0.0F);
-  std::vector<float> rate(cells);
-  std::vector<float> variance(cells);
-  std::vector<float> glare(cells, 0.0F);
-  TakeGlare(frame, {rate, variance, glare});
-  ambient_ = std::move(rate);
-  ambient_glare_ = std::move(glare);
 }
 
-// Means over cells of a picture less its glare, and the light that was glare.
-void GroupReader::TakeGlare(const RateFrame& rates, CellValues cells) const {
-  weights_.Means(rates, 0, cells.rate, cells.variance);
-  if (glare_.empty()) {
+// The mean over the planes that see the channel; a cell must be seen by all.
+void GroupReader::ReadPlanes(const RateFrame& rates,
+                             int group,
+                             std::size_t channel,
+                             CellValues cells) const {
+  const auto spots = session_.schedule().Group(group);
+  const std::vector<Part>& parts = parts_[channel];
+  if (parts.size() == 1 && parts[0].factor == 1) {
+    planes_[parts[0].plane].Read(rates, spots, cells);
     return;
   }
-  BinnedPicture binned(calibration_.camera.width_px, calibration_.camera.height_px);
-  binned.Fill(rates.rate, calibration_.camera.width_px);
-  weights_.MeansOfBins(glare_.Scattered(std::move(binned)), cells.glare);
-  const auto gain = static_cast<float>(1 / (1 - glare_.fraction()));
-  for (std::size_t k = 0; k < cells.rate.size(); ++k) {
-    cells.rate[k] = cells.rate[k] * gain - cells.glare[k];
-    cells.variance[k] *= gain * gain;
+  const std::size_t count = cells.rate.size();
+  std::vector<float> rate(count);
+  std::vector<float> variance(count);
+  std::vector<float> glare(count);
+  std::fill(cells.variance.begin(), cells.variance.end(), 0.0F);
+  for (const Part& part : parts) {
+    std::fill(glare.begin(), glare.end(), 0.0F);
+    planes_[part.plane].Read(rates, spots, {rate, variance, glare});
+    for (std::size_t k = 0; k < count; ++k) {
+      cells.rate[k] += part.factor * rate[k];
+      cells.glare[k] += part.factor * glare[k];
+      cells.variance[k] =
+          variance[k] < 0 || cells.variance[k] < 0
+              ? -1.0F
+              : cells.variance[k] + part.factor * part.factor * variance[k];
+    }
   }
 }
 
@@ -231,8 +229,7 @@ GroupPicture GroupReader::Read(int group) const {
     const CellValues values{std::span(picture.rd).subspan(c * cells, cells),
                             std::span(picture.sigma).subspan(c * cells, cells),
                             std::span(picture.floor).subspan(c * cells, cells)};
-    TakeGlare(rates, values);
-    shift_.Apply(rates, session_.schedule().Group(group), values.rate);
+    ReadPlanes(rates, group, c, values);
     ToRd(values);
   }
   return picture;
@@ -242,10 +239,6 @@ GroupPicture GroupReader::Read(int group) const {
 // glare only to so much is common to neighbouring cells: no mean over pixels lessens
 // it.
 void GroupReader::ToRd(CellValues cells) const {
-  for (std::size_t k = 0; k < ambient_.size(); ++k) {
-    cells.rate[k] -= ambient_[k];
-    cells.glare[k] -= ambient_glare_[k];
-  }
   for (std::size_t k = 0; k < cells.rate.size(); ++k) {
     const float exit = exit_factor_[k];
     const float unsure = glare_sigma_ * std::max(0.0F, cells.glare[k]);
@@ -255,6 +248,14 @@ void GroupReader::ToRd(CellValues cells) const {
         variance < 0 ? -1.0F : std::sqrt(variance + unsure * unsure) * exit;
     cells.glare[k] = unsure * exit;
   }
+}
+
+std::size_t GroupReader::SharedBytes() const {
+  std::size_t bytes = 0;
+  for (const PlaneReader& plane : planes_) {
+    bytes += plane.MemoryBytes();
+  }
+  return bytes;
 }
 
 std::size_t GroupReader::ResultBytes() const {

@@ -3,10 +3,8 @@
 #include "acquire/session.h"
 #include "calibrate/calibration.h"
 #include "calibrate/session_state.h"
-#include "reconstruct/internal/cell_weights.h"
-#include "reconstruct/internal/glare_pyramid.h"
 #include "reconstruct/internal/hdr_merge.h"
-#include "reconstruct/internal/window_shift.h"
+#include "reconstruct/internal/plane_reader.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <cstdint>
@@ -40,7 +38,9 @@ class GroupReader {
               const calibrate::SpotProfile& spot,
               int thread_count);
 
-  const CellLattice& lattice() const { return weights_.lattice(); }
+  const CellLattice& lattice() const { return planes_.front().weights().lattice(); }
+  /// Of the first plane, which is all of a monochrome sensor.
+  const CellWeights& weights() const { return planes_.front().weights(); }
 
   /// Whether all of the group's pictures were taken, or left out on purpose.
   bool IsThere(int group) const;
@@ -57,39 +57,37 @@ class GroupReader {
   /// outline and an adaptive capture leave points out.
   std::vector<bool> LitPoints() const;
 
-  std::size_t SharedBytes() const {
-    return weights_.MemoryBytes() + shift_.MemoryBytes();
-  }
+  std::size_t SharedBytes() const;
   /// Memory that one call of Read() needs, and what its result holds.
   std::size_t WorkingBytes() const;
   std::size_t ResultBytes() const;
 
  private:
-  // Of all cells: rates, their variances and the glare that was in them.
-  struct CellValues {
-    std::span<float> rate;
-    std::span<float> variance;
-    std::span<float> glare;
+  // A plane's part in a channel's mean, its rates being divided by what its colour sees
+  // of the laser.
+  struct Part {
+    std::size_t plane;
+    float factor;
   };
   const std::vector<std::int64_t>& Pictures(int group, int channel) const;
-  void TakeAmbient();
-  void TakeGlare(const RateFrame& rates, CellValues cells) const;
+  void AddPlanes(const SurfaceModel& surface, int thread_count);
+  void ReadPlanes(const RateFrame& rates,
+                  int group,
+                  std::size_t channel,
+                  CellValues cells) const;
   void ToRd(CellValues cells) const;
 
   const acquire::SessionReader& session_;
   const calibrate::Calibration& calibration_;
   const calibrate::SessionState& state_;
   const RdHeader& header_;
-  CellWeights weights_;
-  WindowShift shift_;  // to where the beams really were
+  std::vector<PlaneReader> planes_;       // those that any channel needs
+  std::vector<std::vector<Part>> parts_;  // a channel
   /// [group · channels + channel]: numbers of the pictures, one an exposure.
   std::vector<std::vector<std::int64_t>> pictures_;
   /// R_d of unit rate is exit_factor_[cell] · that of the spot and channel.
   std::vector<float> exit_factor_;
-  GlarePyramid glare_;
-  float glare_sigma_ = 0;             // of what is taken away as glare, relative
-  std::vector<float> ambient_;        // a cell, glare taken away; empty: none
-  std::vector<float> ambient_glare_;  // what was taken away
+  float glare_sigma_ = 0;  // of what is taken away as glare, relative
 };
 
 }  // namespace nacre::reconstruct::internal

@@ -173,6 +173,8 @@ bool AnySaturated(std::span<const acquire::Frame> frames, double saturation_coun
 // A hot pixel's noise is beyond the model; what its neighbours saw stands for it.
 void FillHotPixels(const calibrate::Calibration& calibration, RateFrame& rates) {
   const int width = calibration.camera.width_px;
+  // In a mosaic the nearest of the same colour.
+  const int step = calibration.corrections.filters.mosaic.empty() ? 1 : 2;
   const auto pixels = static_cast<std::int64_t>(rates.rate.size());
   std::vector<char> hot(rates.rate.size(), 0);
   for (const calibrate::HotPixel& pixel : calibration.corrections.hot_pixels) {
@@ -191,12 +193,12 @@ void FillHotPixels(const calibrate::Calibration& calibration, RateFrame& rates) 
       }
     };
     const int x = pixel.index % width;
-    if (x > 0 && x + 1 < width) {
-      add(pixel.index - 1);
-      add(pixel.index + 1);
+    if (x >= step && x + step < width) {
+      add(pixel.index - step);
+      add(pixel.index + step);
     }
-    add(pixel.index - width);
-    add(pixel.index + width);
+    add(pixel.index - std::int64_t{step} * width);
+    add(pixel.index + std::int64_t{step} * width);
     const auto at = static_cast<std::size_t>(pixel.index);
     rates.rate[at] = count > 0 ? rate / count : 0.0F;
     rates.variance[at] = count > 0 ? variance / count : -1.0F;

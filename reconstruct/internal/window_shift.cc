@@ -53,11 +53,21 @@ WindowShift::WindowShift(const CellLattice& lattice,
                          const calibrate::CameraGeometry& camera,
                          const std::function<PointMm(PointMm)>& on_surface,
                          const RdHeader& header,
-                         std::vector<PointMm> offsets)
+                         std::vector<PointMm> offsets,
+                         const calibrate::SpotProfile& spot)
     : lattice_(lattice),
       header_(header),
       width_px_(camera.width_px),
+      height_px_(camera.height_px),
       offsets_(std::move(offsets)) {
+  // A pixel's width is a twelfth, bilinear steps are a sixth on the average.
+  constexpr double kSteps = 1.0 / 12 + 1.0 / 6;
+  const double pixel_mm2 =
+      camera.FootprintMm2({0.5 * (camera.width_px - 1), 0.5 * (camera.height_px - 1)});
+  const double variance_mm2 = 0.5 * (spot.xx_mm2 + spot.yy_mm2);
+  blur_px2_ = variance_mm2 > 0
+                  ? static_cast<float>(0.5 * (variance_mm2 / pixel_mm2 + kSteps))
+                  : 0.0F;
   double farthest = 0;
   for (PointMm& offset : offsets_) {
     offset = {offset.x / lattice.pitch_mm, -offset.y / lattice.pitch_mm};
@@ -107,6 +117,20 @@ std::size_t WindowShift::Horizontal(int column, int row) const {
                                   lattice_.Index(column, row));
 }
 
+// A pixel less its blur: 1 − σ²/2 ∇².
+float WindowShift::Sharp(const RateFrame& rates, int pixel) const {
+  const int x = pixel % width_px_;
+  const int y = pixel / width_px_;
+  const auto at = [&](int column, int row) {
+    return rates
+        .rate[static_cast<std::size_t>(std::clamp(row, 0, height_px_ - 1) * width_px_ +
+                                       std::clamp(column, 0, width_px_ - 1))];
+  };
+  const float middle = at(x, y);
+  return middle - blur_px2_ * (at(x - 1, y) + at(x + 1, y) + at(x, y - 1) +
+                               at(x, y + 1) - 4 * middle);
+}
+
 // The mean along an edge; 0 where it isn't seen whole.
 float WindowShift::Edge(const RateFrame& rates, std::size_t edge) const {
   float sum = 0;
@@ -115,11 +139,11 @@ float WindowShift::Edge(const RateFrame& rates, std::size_t edge) const {
     if (at.pixel < 0) {
       return 0;
     }
-    const float* const upper = &rates.rate[static_cast<std::size_t>(at.pixel)];
-    const float* const lower = upper + width_px_;
-    sum += std::lerp(std::lerp(upper[0], upper[1], at.right),
-                     std::lerp(lower[0], lower[1], at.right),
-                     at.down);
+    const int below = at.pixel + width_px_;
+    sum += std::lerp(
+        std::lerp(Sharp(rates, at.pixel), Sharp(rates, at.pixel + 1), at.right),
+        std::lerp(Sharp(rates, below), Sharp(rates, below + 1), at.right),
+        at.down);
   }
   return sum / kPoints;
 }

@@ -21,7 +21,8 @@ std::vector<PointMm> BeamOffsets(const acquire::SessionReader& session,
 
 /// Windows go with the beams, cells don't: the mean over a cell that is moved by δ is
 ///   M(x + δ) = M(x) + δ · ∇M,   pitch ∂M/∂x = ∫ right edge − ∫ left edge,
-/// to first order. Edges are seen in the picture itself, pixels bilinear.
+/// to first order. Edges are seen in the picture itself, pixels bilinear, and what
+/// spot, pixels and bilinear steps blur is undone to first order.
 class WindowShift {
  public:
   /// `on_surface`: where a point of the lattice lies on the surface that `camera` is
@@ -30,7 +31,8 @@ class WindowShift {
               const calibrate::CameraGeometry& camera,
               const std::function<PointMm(PointMm)>& on_surface,
               const RdHeader& header,
-              std::vector<PointMm> offsets);
+              std::vector<PointMm> offsets,
+              const calibrate::SpotProfile& spot);
 
   /// Moves the cells of `means` (all cells of the lattice) that are nearest to the
   /// spots of a group as far as their spots are off.
@@ -48,6 +50,7 @@ class WindowShift {
     float right = 0;
     float down = 0;
   };
+  float Sharp(const RateFrame& rates, int pixel) const;
   std::size_t Vertical(int column, int row) const;
   std::size_t Horizontal(int column, int row) const;
   float Edge(const RateFrame& rates, std::size_t edge) const;
@@ -59,6 +62,8 @@ class WindowShift {
   CellLattice lattice_;
   RdHeader header_;
   int width_px_;
+  int height_px_;
+  float blur_px2_;                // half the variance along an axis
   std::vector<PointMm> offsets_;  // in cells, right and down; empty: nothing to do
   std::vector<Place> places_;     // kPoints an edge
 };
