@@ -1,10 +1,12 @@
 #include "reconstruct/internal/cell_weights.h"
 
 #include "core/parallel.h"
+#include "reconstruct/internal/lanes.h"
 #include "reconstruct/internal/weight_box.h"
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -12,8 +14,6 @@ namespace {
 // Pixel edges are drawn straight in the sample plane; what distortion bends them by is
 // far below this share of a cell.
 constexpr double kFullCover = 0.999;
-
-constexpr int kLanes = 16;  // pixels a vector
 
 // Cells are cut a few rows at a time, so that the pieces of a large picture needn't all
 // be there.
@@ -33,10 +33,7 @@ class CellWeights::BoxBuilder {
              const calibrate::CameraGeometry& camera,
              const calibrate::SpotProfile& spot,
              const PixelModel& model)
-      : lattice_(lattice),
-        camera_(camera),
-        model_(model),
-        sharpener_(spot, camera) {}
+      : lattice_(lattice), camera_(camera), model_(model), sharpener_(spot, camera) {}
 
   // Of all cells in the band, in their order.
   void Add(RowBand band) {
@@ -168,9 +165,8 @@ CellWeights::CellWeights(const CellLattice& lattice,
   const int at_once = ThreadCount(thread_count);
   for (int first = 0; first < bands; first += at_once) {
     const int count = std::min(at_once, bands - first);
-    std::vector<BoxBuilder> builders(
-        static_cast<std::size_t>(count),
-        BoxBuilder(lattice_, camera, spot, model));
+    std::vector<BoxBuilder> builders(static_cast<std::size_t>(count),
+                                     BoxBuilder(lattice_, camera, spot, model));
     ParallelFor(count, thread_count, [&](std::int64_t n) {
       const int begin = (first + static_cast<int>(n)) * kRowsABand;
       builders[static_cast<std::size_t>(n)].Add(
@@ -187,51 +183,39 @@ CellWeights::CellWeights(const CellLattice& lattice,
 
 namespace {
 
-struct Sums {
-  float mean[kLanes] = {};
-  float variance[kLanes] = {};
-  float least[kLanes] = {};  // below 0: a pixel isn't usable
-};
-
-// One row of a box, whole vectors.
-[[gnu::always_inline]] inline void AddRow(const float* __restrict weight,
-                                          const float* __restrict rate,
-                                          const float* __restrict variance,
-                                          int width,
-                                          Sums& sums) {
-  for (int x = 0; x < width; x += kLanes) {
-    for (int lane = 0; lane < kLanes; ++lane) {
-      const float w = weight[x + lane];
-      const float share = w * w * variance[x + lane];
-      sums.mean[lane] += w * rate[x + lane];
-      sums.variance[lane] += share;
-      sums.least[lane] = std::min(sums.least[lane], share);
-    }
-  }
-}
-
 __attribute__((target_clones("avx512f", "avx2", "default"))) void SumBox(
     const std::uint32_t* __restrict rows,
     const float* __restrict weights,
     std::pair<int, int> count_width,
     const RateFrame& frame,
     float* __restrict results) {
-  Sums sums;
+  Lanes mean_sum = {};
+  Lanes variance_sum = {};
+  Lanes least_share = {};  // below 0: a pixel isn't usable
   const auto [count, width] = count_width;
   for (int row = 0; row < count; ++row) {
-    AddRow(weights + static_cast<std::ptrdiff_t>(row) * width,
-           frame.rate.data() + rows[row],
-           frame.variance.data() + rows[row],
-           width,
-           sums);
+    const float* rate_row = frame.rate.data() + rows[row];
+    const float* variance_row = frame.variance.data() + rows[row];
+    for (int x = 0; x < width; x += kLanes, weights += kLanes) {
+      Lanes weight;
+      Lanes rate;
+      Lanes variance;
+      std::memcpy(&weight, weights, sizeof weight);
+      std::memcpy(&rate, rate_row + x, sizeof rate);
+      std::memcpy(&variance, variance_row + x, sizeof variance);
+      const Lanes share = weight * weight * variance;
+      mean_sum += weight * rate;
+      variance_sum += share;
+      least_share = share < least_share ? share : least_share;
+    }
   }
   float mean = 0;
   float variance = 0;
   float least = 0;
   for (int lane = 0; lane < kLanes; ++lane) {
-    mean += sums.mean[lane];
-    variance += sums.variance[lane];
-    least = std::min(least, sums.least[lane]);
+    mean += mean_sum[lane];
+    variance += variance_sum[lane];
+    least = std::min(least, least_share[lane]);
   }
   results[0] = least < 0 ? 0.0F : mean;
   results[1] = least < 0 ? -1.0F : variance;
@@ -242,20 +226,20 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) float SumBins(
     const float* __restrict weights,
     std::pair<int, int> count_width,
     const float* __restrict values) {
-  float sums[kLanes] = {};
+  Lanes sums = {};
   const auto [count, width] = count_width;
   for (int row = 0; row < count; ++row) {
-    const float* weight = weights + static_cast<std::ptrdiff_t>(row) * width;
-    const float* value = values + rows[row];
-    for (int x = 0; x < width; x += kLanes) {
-      for (int lane = 0; lane < kLanes; ++lane) {
-        sums[lane] += weight[x + lane] * value[x + lane];
-      }
+    for (int x = 0; x < width; x += kLanes, weights += kLanes) {
+      Lanes weight;
+      Lanes value;
+      std::memcpy(&weight, weights, sizeof weight);
+      std::memcpy(&value, values + rows[row] + x, sizeof value);
+      sums += weight * value;
     }
   }
   float sum = 0;
-  for (const float part : sums) {
-    sum += part;
+  for (int lane = 0; lane < kLanes; ++lane) {
+    sum += sums[lane];
   }
   return sum;
 }

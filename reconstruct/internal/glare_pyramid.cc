@@ -1,9 +1,12 @@
 #include "reconstruct/internal/glare_pyramid.h"
 
+#include "reconstruct/internal/lanes.h"
+
 #include <Eigen/QR>
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 namespace nacre::reconstruct::internal {
@@ -54,7 +57,7 @@ std::vector<double> FitRadii(double hole_px, double reach_px) {
   return radii;
 }
 
-constexpr int kBlock = 32;
+constexpr int kBlock = 2 * kLanes;
 
 // out[x] += Σ_t taps[t] · in[x + t · step], a multiple of kBlock values.
 __attribute__((target_clones("avx512f", "avx2", "default"))) void AddTaps(
@@ -64,17 +67,18 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddTaps(
     std::size_t count,
     float* __restrict out) {
   for (std::size_t x = 0; x < count; x += kBlock) {
-    float sum[kBlock] = {};
+    Lanes sum[2] = {};
     for (std::size_t t = 0; t < taps.size(); ++t) {
-      const float tap = taps[t];
-      const float* from = in + x + t * step;
-      for (std::size_t lane = 0; lane < kBlock; ++lane) {
-        sum[lane] += tap * from[lane];
-      }
+      Lanes values[2];
+      std::memcpy(values, in + x + t * step, sizeof values);
+      sum[0] += taps[t] * values[0];
+      sum[1] += taps[t] * values[1];
     }
-    for (std::size_t lane = 0; lane < kBlock; ++lane) {
-      out[x + lane] += sum[lane];
-    }
+    Lanes before[2];
+    std::memcpy(before, out + x, sizeof before);
+    sum[0] += before[0];
+    sum[1] += before[1];
+    std::memcpy(out + x, sum, sizeof sum);
   }
 }
 

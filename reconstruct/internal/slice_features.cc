@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "reconstruct/internal/lanes.h"
 
 #include <Eigen/Eigenvalues>
 
@@ -9,13 +10,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 
 namespace nacre::reconstruct::internal {
 namespace {
 
 constexpr std::uint64_t kSampleStream = 0x73616D70;
-constexpr int kLanes = 16;  // dimensions a vector
-constexpr int kSlicesAtOnce = 4;
+constexpr int kSlicesAtOnce = 8;
 
 // sums[slice][lane] = Σ_k shapes[slice][k] · components[k][lane], for sixteen columns.
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumns(
@@ -24,17 +25,16 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumn
     std::size_t size,
     std::size_t stride,
     float* __restrict sums) {
-  float sum[kSlicesAtOnce][kLanes] = {};
+  Lanes sum[kSlicesAtOnce] = {};
   for (std::size_t k = 0; k < size; ++k) {
-    const float* row = components + k * stride;
+    Lanes row;
+    std::memcpy(&row, components + k * stride, sizeof row);
+#pragma GCC unroll 8
     for (std::size_t s = 0; s < kSlicesAtOnce; ++s) {
-      const float value = shapes[s * size + k];
-      for (std::size_t lane = 0; lane < kLanes; ++lane) {
-        sum[s][lane] += value * row[lane];
-      }
+      sum[s] += shapes[s * size + k] * row;
     }
   }
-  std::copy(&sum[0][0], &sum[0][0] + kSlicesAtOnce * kLanes, sums);
+  std::memcpy(sums, sum, sizeof sum);
 }
 
 std::size_t Stride(int dimensions) {
