@@ -22,6 +22,8 @@ struct Arguments {
   std::vector<std::string> defines;
   bool lenient = false;
   bool stats = false;
+  bool reference = false;
+  std::filesystem::path checkpoint;
   double exposure_ev = 0;
   render::RenderOptions options;
 };
@@ -41,6 +43,12 @@ void AddArguments(CLI::App& app, Arguments& arguments) {
                arguments.lenient,
                "unknown words in the scene are left out with a warning");
   app.add_flag("--stats", arguments.stats, "print where time went and what was done");
+  app.add_flag(
+      "--reference", arguments.reference, "the same as --integrator reference");
+  app.add_option("--checkpoint",
+                 arguments.checkpoint,
+                 "keep all samples in this file every ten seconds; if it is there "
+                 "already, go on from it");
   AddOptions(app, arguments.options);
 }
 
@@ -60,9 +68,10 @@ std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments)
   Provenance provenance;
   provenance.command = "render";
   provenance.options = OptionsToJson(arguments.options);
-  // Neither changes the picture.
-  provenance.options.erase("snapshot");
-  provenance.options.erase("thread_count");
+  // These don't change the picture.
+  for (const char* name : {"snapshot", "thread_count", "aovs"}) {
+    provenance.options.erase(name);
+  }
   provenance.options["seed"] = arguments.options.seed;
   provenance.options["define"] = arguments.defines;
   for (const std::filesystem::path& file : scene.files) {
@@ -71,21 +80,34 @@ std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments)
   return provenance.ToString();
 }
 
+// What a sample depends on: a picture may be gone on with to more of them.
+std::string IdentityOf(const std::string& provenance) {
+  Json identity = ParseJson(provenance, "provenance");
+  for (const char* name : {"spp", "time_limit", "error_target", "adaptive"}) {
+    identity["options"].erase(name);
+  }
+  return identity.dump();
+}
+
 bool IsPng(const std::filesystem::path& path) {
   return path.extension() == ".png";
 }
 
 void WriteImage(const std::filesystem::path& path,
-                ExrPart image,
+                std::vector<ExrPart> parts,
                 const Arguments& arguments,
                 const std::string& provenance) {
+  ExrPart& image = parts.front();
   if (IsPng(path)) {
     WritePng(path, render::ToPng(image, arguments.exposure_ev));
     return;
   }
+  if (parts.size() > 1) {
+    image.name = "image";
+  }
   image.attributes["nacre.kind"] = "image";
   image.attributes["nacre.provenance"] = provenance;
-  WriteExr(path, {std::move(image)});
+  WriteExr(path, parts);
 }
 
 int Run(Arguments& arguments, const Common& common) {
@@ -94,6 +116,9 @@ int Run(Arguments& arguments, const Common& common) {
                      ": the name must end in .exr or .png");
   }
   render::RenderOptions& options = arguments.options;
+  if (arguments.reference) {
+    options.integrator = "reference";
+  }
   options.seed = common.seed;
   options.thread_count = common.thread_count;
   const render::Scene scene = render::ReadScene(
@@ -103,15 +128,21 @@ int Run(Arguments& arguments, const Common& common) {
     Say(common, note);
   }
   const std::string provenance = ProvenanceOf(scene, arguments);
-  const auto save = [&](const ExrPart& image) {
-    WriteImage(arguments.out, image, arguments, provenance);
+  const auto save = [&](const std::vector<ExrPart>& parts) {
+    WriteImage(arguments.out, parts, arguments, provenance);
     if (!arguments.png.empty()) {
-      WriteImage(arguments.png, image, arguments, provenance);
+      WriteImage(arguments.png, parts, arguments, provenance);
     }
   };
   const render::Rendering rendering =
-      render::Render(scene, options, ConsoleProgress(common), save);
-  save(rendering.image);
+      render::Render(scene,
+                     options,
+                     ConsoleProgress(common),
+                     [&](const ExrPart& image) { save({image}); },
+                     {arguments.checkpoint, IdentityOf(provenance)});
+  std::vector<ExrPart> parts = rendering.aovs;
+  parts.insert(parts.begin(), rendering.image);
+  save(parts);
   Json json = rendering.summary.ToJson();
   json["out"] = arguments.out.string();
   Print(common,

@@ -2,12 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <limits>
 
 namespace nacre::render {
 namespace {
 
-double LuminanceOf(double r, double g, double b) {
+double Weighed(double r, double g, double b) {
   return 0.2126 * r + 0.7152 * g + 0.0722 * b;
 }
 
@@ -35,27 +36,41 @@ bool Accumulator::Add(std::size_t pixel,
   sums.g += g;
   sums.b += b;
   sums.a += w * static_cast<double>(alpha);
-  const double luminance = LuminanceOf(r, g, b);
+  const double luminance = Weighed(r, g, b);
+  ++sums.samples;
   sums.squares += luminance * luminance;
   return true;
 }
 
-double Accumulator::RelativeError(int sample_count) const {
+Accumulator::Luminance Accumulator::LuminanceOf(std::size_t pixel) const {
+  const Sums& sums = sums_[pixel];
+  const auto n = static_cast<double>(sums.samples);
+  Luminance luminance{0, std::numeric_limits<double>::infinity(), sums.samples};
+  if (n > 0) {
+    luminance.mean = Weighed(sums.r, sums.g, sums.b) / n;
+  }
+  if (n > 1) {
+    const double spread = sums.squares / n - luminance.mean * luminance.mean;
+    luminance.variance = std::max(0.0, spread) * n / (n - 1);
+  }
+  return luminance;
+}
+
+double Accumulator::RelativeError() const {
   double variances = 0;
   double squares = 0;
-  for (const Sums& sums : sums_) {
-    const double n = static_cast<double>(sample_count - sums.left_out);
-    if (n < 2) {
+  for (std::size_t i = 0; i < sums_.size(); ++i) {
+    const Luminance pixel = LuminanceOf(i);
+    if (pixel.samples < 2) {
       return std::numeric_limits<double>::infinity();
     }
-    const double mean = LuminanceOf(sums.r, sums.g, sums.b) / n;
-    variances += std::max(0.0, sums.squares / n - mean * mean) / (n - 1);
-    squares += mean * mean;
+    variances += pixel.variance / static_cast<double>(pixel.samples);
+    squares += pixel.mean * pixel.mean;
   }
   return squares > 0 ? std::sqrt(variances / squares) : 0;
 }
 
-ExrPart Accumulator::ToImage(int sample_count) const {
+ExrPart Accumulator::ToImage() const {
   const bool luminance = film_.format == PixelFormat::kLuminance ||
                          film_.format == PixelFormat::kLuminanceAlpha;
   const bool alpha = film_.format == PixelFormat::kRgba ||
@@ -72,10 +87,9 @@ ExrPart Accumulator::ToImage(int sample_count) const {
   image.values.resize(image.channels.size() * n);
   for (std::size_t i = 0; i < n; ++i) {
     const Sums& sums = sums_[i];
-    const double kept = static_cast<double>(sample_count - sums.left_out);
-    const double scale = kept > 0 ? 1 / kept : 0;
+    const double scale = sums.samples > 0 ? 1 / static_cast<double>(sums.samples) : 0;
     if (luminance) {
-      image.values[i] = static_cast<float>(scale * LuminanceOf(sums.r, sums.g, sums.b));
+      image.values[i] = static_cast<float>(scale * Weighed(sums.r, sums.g, sums.b));
     } else {
       image.values[i] = static_cast<float>(scale * sums.r);
       image.values[n + i] = static_cast<float>(scale * sums.g);
@@ -87,6 +101,39 @@ ExrPart Accumulator::ToImage(int sample_count) const {
     }
   }
   return image;
+}
+
+std::vector<ExrPart> Accumulator::ToAovs() const {
+  const auto part = [&](const char* name, const char* channel) {
+    ExrPart made;
+    made.name = name;
+    made.width = film_.crop_width;
+    made.height = film_.crop_height;
+    made.channels = {channel};
+    made.values.resize(sums_.size());
+    return made;
+  };
+  ExrPart variance = part("variance", "Y");
+  ExrPart samples = part("samples", "N");
+  for (std::size_t i = 0; i < sums_.size(); ++i) {
+    const Luminance pixel = LuminanceOf(i);
+    const auto n = static_cast<double>(pixel.samples);
+    variance.values[i] = n > 1 ? static_cast<float>(pixel.variance / n) : 0.0F;
+    samples.values[i] = static_cast<float>(n);
+  }
+  return {std::move(variance), std::move(samples)};
+}
+
+std::string Accumulator::Bytes() const {
+  return {reinterpret_cast<const char*>(sums_.data()), sums_.size() * sizeof(Sums)};
+}
+
+bool Accumulator::Restore(std::string_view bytes) {
+  if (bytes.size() != sums_.size() * sizeof(Sums)) {
+    return false;
+  }
+  std::memcpy(sums_.data(), bytes.data(), bytes.size());
+  return true;
 }
 
 }  // namespace nacre::render

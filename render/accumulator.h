@@ -4,11 +4,14 @@
 #include "render/film.h"
 
 #include <cstdint>
+#include <string>
+#include <string_view>
 #include <vector>
 
 namespace nacre::render {
 
-/// Sums of samples, a pixel of the crop window.
+/// Sums of samples, a pixel of the crop window. Pixels may have different numbers of
+/// them.
 class Accumulator {
  public:
   explicit Accumulator(const Film& film);
@@ -16,14 +19,36 @@ class Accumulator {
   /// Samples that aren't finite are left out; false for those.
   bool Add(std::size_t pixel, Color radiance, float alpha, float filter_weight);
 
-  /// The relative L2 error of the luminance that independent samples would leave: the
-  /// root of the pixels' summed variances over that of their summed squares. An upper
-  /// bound in practice, since samples are spread better than independent ones. Infinite
-  /// below two samples, 0 for a black picture.
-  double RelativeError(int sample_count) const;
+  /// Of one pixel's luminance, in figures of independent samples: an upper bound in
+  /// practice, since samples are spread better than those.
+  struct Luminance {
+    double mean = 0;
+    double variance = 0;  ///< of a sample; infinite below two samples
+    std::int64_t samples = 0;
+  };
+  Luminance LuminanceOf(std::size_t pixel) const;
+  /// With those that were left out.
+  std::int64_t SamplesMade(std::size_t pixel) const {
+    return sums_[pixel].samples + sums_[pixel].left_out;
+  }
 
-  /// The mean over `sample_count` samples a pixel, in the film's format.
-  ExrPart ToImage(int sample_count) const;
+  /// The relative L2 error of the luminance: the root of the variances of the pixels'
+  /// means, summed, over that of their summed squares. Infinite while a pixel has less
+  /// than two samples, 0 for a black picture.
+  double RelativeError() const;
+
+  /// The means, in the film's format.
+  ExrPart ToImage() const;
+  /// The variance of each pixel's mean luminance (part "variance", channel Y), and how
+  /// many samples it has (part "samples", channel N).
+  std::vector<ExrPart> ToAovs() const;
+
+  std::size_t PixelCount() const { return sums_.size(); }
+
+  /// All sums as bytes, of this machine's kind, and back. False if `bytes` are of
+  /// another size of film.
+  std::string Bytes() const;
+  bool Restore(std::string_view bytes);
 
  private:
   struct Sums {
@@ -32,6 +57,7 @@ class Accumulator {
     double b = 0;
     double a = 0;
     double squares = 0;  ///< of the luminance
+    std::int64_t samples = 0;
     std::int64_t left_out = 0;
   };
   Film film_;

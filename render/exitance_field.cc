@@ -23,6 +23,26 @@ std::int64_t NodeSlot(int i, int j, int n) {
   return std::int64_t{j} * (n + 1) - std::int64_t{j} * (j - 1) / 2 + i;
 }
 
+// For what is blurred, points of the grid that many apart will do.
+constexpr int kCoarse = 4;
+
+// A cell of a lattice, and the side to which a normal mostly points. No object reaches
+// over the 2²⁰ cells after which numbers repeat: GatherPatches sees to that.
+std::uint64_t CellOf(const SurfacePoint& point, float per_mm) {
+  std::uint64_t cell = 0;
+  int side = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto along =
+        static_cast<std::int64_t>(std::floor(point.position_mm[axis] * per_mm));
+    cell = (cell << 20) | (static_cast<std::uint64_t>(along) & 0xFFFFFu);
+    if (std::abs(point.normal[axis]) > std::abs(point.normal[side])) {
+      side = axis;
+    }
+  }
+  return (cell << 3) |
+         static_cast<std::uint64_t>(2 * side + (point.normal[side] < 0 ? 1 : 0));
+}
+
 // A point a vertex, with the normal and the tangents of the triangles around it.
 std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
   const auto& mesh = std::get<TriangleMesh>(shape.geometry);
@@ -90,7 +110,47 @@ void ExitanceField::PlanMesh(const TriangleMesh& mesh, float spacing) {
     }
   }
   vertices_ = VertexPoints(shape_, mm_per_unit_);
+  ChooseForBlurred(spacing * mm_per_unit_);
   Allocate(next);
+}
+
+// One vertex for all in a cell that face the same way: the nearest to their middle.
+void ExitanceField::ChooseForBlurred(float spacing_mm) {
+  struct Member {
+    std::uint64_t cell;
+    std::uint32_t vertex;
+    bool operator<(const Member& b) const {
+      return cell != b.cell ? cell < b.cell : vertex < b.vertex;
+    }
+  };
+  const float per_mm = 1 / (static_cast<float>(kCoarse) * spacing_mm);
+  std::vector<Member> members;
+  members.reserve(vertices_.size());
+  for (std::size_t i = 0; i < vertices_.size(); ++i) {
+    members.push_back({CellOf(vertices_[i], per_mm), static_cast<std::uint32_t>(i)});
+  }
+  std::sort(members.begin(), members.end());
+  for_blurred_.resize(vertices_.size());
+  for (auto begin = members.begin(); begin != members.end();) {
+    const auto end = std::find_if(
+        begin, members.end(), [&](const Member& m) { return m.cell != begin->cell; });
+    Vec3 sum;
+    for (auto m = begin; m != end; ++m) {
+      sum += vertices_[m->vertex].position_mm;
+    }
+    const Vec3 middle = sum / static_cast<float>(end - begin);
+    const auto distance2 = [&](const Member& m) {
+      const Vec3 d = vertices_[m.vertex].position_mm - middle;
+      return Dot(d, d);
+    };
+    const auto chosen =
+        std::min_element(begin, end, [&](const Member& a, const Member& b) {
+          return distance2(a) < distance2(b);
+        });
+    for (; begin != end; ++begin) {
+      for_blurred_[begin->vertex] = chosen->vertex;
+    }
+  }
 }
 
 void ExitanceField::PlanSphere(const Sphere& sphere, float spacing) {
@@ -158,16 +218,43 @@ Color ExitanceField::AtNode(const SurfaceHit& hit,
 }
 
 Color ExitanceField::At(const SurfaceHit& hit, const ExitanceQuery& query) const {
-  if (query.sharp || grid_size_ == 0 || divisions_.empty() ||
-      divisions_[hit.triangle] > 1) {
+  if (query.sight == Sight::kSharp || grid_size_ == 0) {
     return At(hit, query.counters);
   }
-  // Blurred by the light's way, the nearest corner will do: a third of the questions.
+  if (!divisions_.empty() && divisions_[hit.triangle] == 1) {
+    return AtCorner(hit, query.sight, query.counters);
+  }
+  return query.sight == Sight::kBlurred ? AtCoarseNode(hit, query.counters)
+                                        : At(hit, query.counters);
+}
+
+// The nearest corner, or what stands for it.
+Color ExitanceField::AtCorner(const SurfaceHit& hit,
+                              Sight sight,
+                              PathCounters& counters) const {
   const float b1 = hit.barycentric.x;
   const float b2 = hit.barycentric.y;
   const float b0 = 1 - b1 - b2;
   const auto& t = std::get<TriangleMesh>(shape_.geometry).triangles[hit.triangle];
-  return AtVertex(b0 >= b1 && b0 >= b2 ? t[0] : b1 >= b2 ? t[1] : t[2], query.counters);
+  const std::uint32_t corner = b0 >= b1 && b0 >= b2 ? t[0] : b1 >= b2 ? t[1] : t[2];
+  return AtVertex(sight == Sight::kBlurred ? for_blurred_[corner] : corner, counters);
+}
+
+// The nearest node of every kCoarse-th.
+Color ExitanceField::AtCoarseNode(const SurfaceHit& hit, PathCounters& counters) const {
+  const auto nearest = [](float along, int last) {
+    const int node = kCoarse * static_cast<int>(along / kCoarse + 0.5F);
+    return std::clamp(node, 0, last);
+  };
+  if (columns_ > 0) {
+    return AtLatitude(nearest(hit.uv.x * static_cast<float>(columns_), columns_),
+                      nearest(hit.uv.y * static_cast<float>(rows_), rows_),
+                      counters);
+  }
+  const int n = divisions_[hit.triangle];
+  const int i = nearest(hit.barycentric.x * static_cast<float>(n), n);
+  return AtNode(
+      hit, i, nearest(hit.barycentric.y * static_cast<float>(n), n - i), counters);
 }
 
 Color ExitanceField::AtMesh(const SurfaceHit& hit, PathCounters& counters) const {

@@ -24,7 +24,8 @@ class ExitanceField final : public ExitanceSource {
                 std::unique_ptr<const Subsurface> subsurface,
                 float spacing_mm);
 
-  /// At a hit of the shape; what isn't sharp may be a grid's spacing off.
+  /// At a hit of the shape. What is dim may be a grid's spacing off; what is blurred
+  /// may come from anywhere within a few of them, so that there is less to ask.
   Color At(const SurfaceHit& hit, const ExitanceQuery& query) const override;
   Color At(const SurfaceHit& hit, PathCounters& counters) const;
 
@@ -42,7 +43,10 @@ class ExitanceField final : public ExitanceSource {
   void PlanMesh(const TriangleMesh& mesh, float spacing);
   void PlanSphere(const Sphere& sphere, float spacing);
   void Allocate(std::int64_t count);
+  void ChooseForBlurred(float spacing_mm);
 
+  Color AtCorner(const SurfaceHit& hit, Sight sight, PathCounters& counters) const;
+  Color AtCoarseNode(const SurfaceHit& hit, PathCounters& counters) const;
   Color AtMesh(const SurfaceHit& hit, PathCounters& counters) const;
   Color AtSphere(const SurfaceHit& hit, PathCounters& counters) const;
   Color AtVertex(std::uint32_t vertex, PathCounters& counters) const;
@@ -63,6 +67,7 @@ class ExitanceField final : public ExitanceSource {
   std::vector<std::int32_t> divisions_;
   std::vector<std::int64_t> first_slot_;
   std::vector<SurfacePoint> vertices_;
+  std::vector<std::uint32_t> for_blurred_;  ///< the vertex that stands for a vertex
   // Spheres.
   int columns_ = 0;
   int rows_ = 0;

@@ -8,12 +8,18 @@
 
 namespace nacre::render {
 
+/// How well the picture shows what a path found.
+enum class Sight {
+  kSharp,    ///< from the camera, or in mirrors and things almost as sharp
+  kDim,      ///< so too, but at little of its brightness
+  kBlurred,  ///< as light from a wide angle
+};
+
 /// A question for the exitance at a hit, with what may serve to answer it.
 struct ExitanceQuery {
   Sampler& sampler;
   PathCounters& counters;
-  /// Seen from the camera, or in mirrors and things almost as sharp.
-  bool sharp;
+  Sight sight;
 };
 
 /// Where a path tracer gets the exitance of one translucent shape from: M in W mm⁻², or

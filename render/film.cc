@@ -96,18 +96,25 @@ FilterSampler::FilterSampler(const Film& film) : radius_(film.filter_radius) {
     cumulative_.push_back(static_cast<float>(c / sum));
   }
   cumulative_.back() = 1;
+  std::size_t cell = 0;
+  for (std::size_t i = 0; i < kCells; ++i) {
+    while (cumulative_[cell] <= static_cast<float>(i) / kCells) {
+      ++cell;
+    }
+    guide_.push_back(cell);
+  }
   scale_ = static_cast<float>(sum / signed_sum);
 }
 
 FilterSampler::Axis FilterSampler::SampleAxis(float u) const {
-  const auto found = std::upper_bound(cumulative_.begin(), cumulative_.end(), u);
-  const auto i = static_cast<std::size_t>(
-      std::min(found - cumulative_.begin(),
-               static_cast<std::ptrdiff_t>(cumulative_.size()) - 1));
+  const float cells = static_cast<float>(cumulative_.size());
+  std::size_t i = guide_[static_cast<std::size_t>(u * cells)];
+  while (cumulative_[i] <= u) {
+    ++i;
+  }
   const float low = i > 0 ? cumulative_[i - 1] : 0.0F;
   const float inside = (u - low) / (cumulative_[i] - low);
-  const float x =
-      (static_cast<float>(i) + inside) / static_cast<float>(cumulative_.size());
+  const float x = (static_cast<float>(i) + inside) / cells;
   return {(2 * x - 1) * radius_, sign_[i]};
 }
 

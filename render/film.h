@@ -51,8 +51,9 @@ class FilterSampler {
   Axis SampleAxis(float u) const;
 
   float radius_ = 0;
-  float scale_ = 1;                ///< ∫|f| / ∫f
-  std::vector<float> cumulative_;  ///< of |f| over the cells of [−radius, radius]
+  float scale_ = 1;                 ///< ∫|f| / ∫f
+  std::vector<float> cumulative_;   ///< of |f| over the cells of [−radius, radius]
+  std::vector<std::size_t> guide_;  ///< first cell that ends above i / size
   std::vector<float> sign_;
 };
 

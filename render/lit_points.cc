@@ -25,6 +25,7 @@ struct Place {
   std::uint32_t triangle;
   std::uint32_t index;  ///< of the Sobol' sequence
   std::uint8_t level;
+  float parts;  ///< of the area, that it stands for: points if none were left out
 };
 
 SurfaceHit PlacePoint(const Shape& shape, std::uint32_t triangle, std::uint32_t index) {
@@ -48,7 +49,7 @@ class Placement {
       SpreadInPlace(0, static_cast<std::int64_t>(std::ceil(count)));
     }
     if (places_.empty()) {  // a surface smaller than half a patch
-      places_.push_back({0, 0, 0});
+      places_.push_back({0, 0, 0, 1});
     }
     return std::move(places_);
   }
@@ -82,22 +83,36 @@ class Placement {
       at_level -= points;
       full_count_ += whole;
       for (double k = 0; k < points; ++k) {
-        places_.push_back({triangle, next_++, static_cast<std::uint8_t>(level)});
+        places_.push_back({triangle,
+                           next_++,
+                           static_cast<std::uint8_t>(level),
+                           std::ldexp(1.0F, 2 * level)});
       }
     }
   }
 
   // Many points, each at its own level: a prefix of the sequence is as even as all of
-  // it.
+  // it. What is left of a level shares the area of all its points, and something is.
   void SpreadInPlace(std::uint32_t triangle, std::int64_t count) {
     full_count_ += count;
+    std::array<std::int64_t, kLevels> all{};
+    std::array<std::int64_t, kLevels> kept{};
+    const std::size_t first = places_.size();
     for (std::int64_t k = 0; k < count; ++k) {
       const auto index = static_cast<std::uint32_t>(k);
       const int level =
           seen_ == nullptr ? 0 : LevelAt(PlacePoint(shape_, triangle, index).position);
-      if (k << (2 * level) < count) {
-        places_.push_back({triangle, index, static_cast<std::uint8_t>(level)});
+      const auto at_level = static_cast<std::size_t>(level);
+      ++all[at_level];
+      if (k << (2 * level) < count || all[at_level] == 1) {
+        ++kept[at_level];
+        places_.push_back({triangle, index, static_cast<std::uint8_t>(level), 0});
       }
+    }
+    for (std::size_t i = first; i < places_.size(); ++i) {
+      const std::size_t level = places_[i].level;
+      places_[i].parts = static_cast<float>(static_cast<double>(all[level]) /
+                                            static_cast<double>(kept[level]));
     }
   }
 
@@ -148,7 +163,7 @@ LitPoints SampleLitPoints(const World& world,
   result.area_mm2 = area_mm2;
   double parts = 0;
   for (const Place& place : places) {
-    parts += std::ldexp(1.0, 2 * place.level);
+    parts += static_cast<double>(place.parts);
   }
 
   const EnteringLight light(world,
@@ -177,7 +192,7 @@ LitPoints SampleLitPoints(const World& world,
           LitPoint& lit = result.points[static_cast<std::size_t>(i)];
           lit.point = ToSurfacePoint(hit, translucency.mm_per_unit);
           lit.area_mm2 =
-              static_cast<float>(std::ldexp(area_mm2 / parts, 2 * place.level));
+              static_cast<float>(area_mm2 / parts * static_cast<double>(place.parts));
           lit.flux_density =
               light.AllLights(hit,
                               samples << place.level,

@@ -2,9 +2,9 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
-#include "render/accumulator.h"
 #include "render/exitances.h"
 #include "render/integrators/path.h"
+#include "render/sample_plan.h"
 #include "render/stopwatch.h"
 #include "render/world.h"
 
@@ -29,35 +29,32 @@ IntegratorSettings ChooseIntegrator(const Scene& scene, const std::string& name)
   return settings;
 }
 
-constexpr int kTile = 16;
-
 // Traces the samples of one pass, tile by tile.
 class Pass {
  public:
   Pass(const Scene& scene,
        const PathTracer& tracer,
        const RenderOptions& options,
+       const SamplePlan& plan,
        Accumulator& film)
       : film_(scene.film),
         camera_(scene.camera),
         tracer_(tracer),
         options_(options),
+        plan_(plan),
         filter_(scene.film),
-        accumulator_(film),
-        tiles_x_((film_.crop_width + kTile - 1) / kTile),
-        tiles_y_((film_.crop_height + kTile - 1) / kTile) {}
+        accumulator_(film) {}
 
-  std::int64_t TileCount() const { return std::int64_t{tiles_x_} * tiles_y_; }
-
-  /// Samples [first, last) of each pixel.
-  void Run(int first,
-           int last,
+  /// The samples of each tile's pixels up to a number of them. `tile_done` gets how
+  /// many were made.
+  void Run(const std::vector<int>& up_to,
            const std::function<void(std::int64_t)>& tile_done,
            RenderSummary& summary) {
-    std::vector<TileCounters> counters(static_cast<std::size_t>(TileCount()));
-    ParallelFor(TileCount(), options_.thread_count, [&](std::int64_t tile) {
-      RunTile(tile, first, last, counters[static_cast<std::size_t>(tile)]);
-      tile_done(tile);
+    std::vector<TileCounters> counters(up_to.size());
+    ParallelFor(plan_.TileCount(), options_.thread_count, [&](std::int64_t tile) {
+      const auto i = static_cast<std::size_t>(tile);
+      RunTile(tile, up_to[i], counters[i]);
+      tile_done(counters[i].samples);
     });
     for (const TileCounters& tile : counters) {
       summary.rays += tile.paths.rays;
@@ -75,20 +72,27 @@ class Pass {
  private:
   struct TileCounters {
     PathCounters paths;
+    std::int64_t samples = 0;
     std::int64_t bad = 0;
     std::int64_t clamped = 0;
   };
 
-  void RunTile(std::int64_t tile, int first, int last, TileCounters& counters) {
-    const int x0 = static_cast<int>(tile % tiles_x_) * kTile;
-    const int y0 = static_cast<int>(tile / tiles_x_) * kTile;
+  void RunTile(std::int64_t tile, int up_to, TileCounters& counters) {
+    constexpr int kTile = SamplePlan::kTile;
+    const int x0 = static_cast<int>(tile % plan_.tiles_x()) * kTile;
+    const int y0 = static_cast<int>(tile / plan_.tiles_x()) * kTile;
     const int x1 = std::min(x0 + kTile, film_.crop_width);
     const int y1 = std::min(y0 + kTile, film_.crop_height);
     for (int y = y0; y < y1; ++y) {
       for (int x = x0; x < x1; ++x) {
-        for (int sample = first; sample < last; ++sample) {
+        const auto pixel =
+            static_cast<std::size_t>(y) * static_cast<std::size_t>(film_.crop_width) +
+            static_cast<std::size_t>(x);
+        const auto done = static_cast<int>(accumulator_.SamplesMade(pixel));
+        for (int sample = done; sample < up_to; ++sample) {
           AddSample(x, y, sample, counters);
         }
+        counters.samples += std::max(0, up_to - done);
       }
     }
   }
@@ -125,18 +129,10 @@ class Pass {
   const Camera& camera_;
   const PathTracer& tracer_;
   const RenderOptions& options_;
+  const SamplePlan& plan_;
   FilterSampler filter_;
   Accumulator& accumulator_;
-  int tiles_x_;
-  int tiles_y_;
 };
-
-// Passes grow, so that a first picture is there soon and a time limit is kept closely;
-// powers of two keep each prefix of the samples well spread.
-int NextPassEnd(int done, int total) {
-  constexpr int kLargest = 16;
-  return std::min(total, done + std::clamp(done, 1, kLargest));
-}
 
 int SamplesAtMost(const Scene& scene, const RenderOptions& options) {
   constexpr int kEnough = 65536;
@@ -145,37 +141,63 @@ int SamplesAtMost(const Scene& scene, const RenderOptions& options) {
                                     : scene.samples_per_pixel;
 }
 
-class PassSchedule {
+class Schedule {
  public:
-  PassSchedule(const RenderOptions& options, double seconds_before)
+  Schedule(const RenderOptions& options, double seconds_before)
       : options_(options), seconds_before_(seconds_before) {}
 
-  /// Whether a pass of that many samples still fits, judged by the ones before.
-  bool TimeLeft(int done, int samples) const {
-    if (options_.time_limit_s <= 0 || done == 0) {
+  /// Whether that many more samples still fit, judged by those `made` since the start.
+  bool TimeLeft(std::int64_t made, std::int64_t samples) const {
+    if (options_.time_limit_s <= 0 || made == 0) {
       return true;
     }
-    const double spent = watch_.Seconds();
-    return seconds_before_ + spent * (1 + static_cast<double>(samples) / done) <=
-           options_.time_limit_s;
+    const double share = static_cast<double>(samples) / static_cast<double>(made);
+    return seconds_before_ + watch_.Seconds() * (1 + share) <= options_.time_limit_s;
   }
 
-  bool SnapshotDue() {
-    if (options_.snapshot_s <= 0 || since_snapshot_.Seconds() < options_.snapshot_s) {
-      return false;
-    }
-    since_snapshot_ = Stopwatch();
-    return true;
+  bool SnapshotDue() { return IsDue(options_.snapshot_s, since_snapshot_); }
+  bool CheckpointDue() {
+    constexpr double kEvery = 10;
+    return IsDue(kEvery, since_checkpoint_);
   }
 
   double Seconds() const { return watch_.Seconds(); }
 
  private:
+  static bool IsDue(double every_s, Stopwatch& since) {
+    if (every_s <= 0 || since.Seconds() < every_s) {
+      return false;
+    }
+    since = Stopwatch();
+    return true;
+  }
+
   const RenderOptions& options_;
   double seconds_before_;
   Stopwatch watch_;
   Stopwatch since_snapshot_;
+  Stopwatch since_checkpoint_;
 };
+
+std::int64_t SamplesMade(const Accumulator& film) {
+  std::int64_t sum = 0;
+  for (std::size_t i = 0; i < film.PixelCount(); ++i) {
+    sum += film.SamplesMade(i);
+  }
+  return sum;
+}
+
+void DescribeSamples(const Accumulator& film, RenderSummary& summary) {
+  const auto pixels = static_cast<std::int64_t>(film.PixelCount());
+  summary.samples_per_pixel = static_cast<int>(SamplesMade(film) / pixels);
+  summary.samples_least = static_cast<int>(film.SamplesMade(0));
+  for (std::size_t i = 0; i < film.PixelCount(); ++i) {
+    const auto made = static_cast<int>(film.SamplesMade(i));
+    summary.samples_least = std::min(summary.samples_least, made);
+    summary.samples_most = std::max(summary.samples_most, made);
+  }
+  summary.relative_error = film.RelativeError();
+}
 
 void DescribeScene(const Scene& scene, const World& world, RenderSummary& summary) {
   summary.width = scene.film.crop_width;
@@ -193,7 +215,8 @@ void DescribeScene(const Scene& scene, const World& world, RenderSummary& summar
 Rendering Render(const Scene& scene,
                  const RenderOptions& options,
                  const ProgressFunction& progress,
-                 const SnapshotFunction& snapshot) {
+                 const SnapshotFunction& snapshot,
+                 const Checkpoint& checkpoint) {
   Validate(options);
   const IntegratorSettings settings = ChooseIntegrator(scene, options.integrator);
   const Stopwatch total;
@@ -201,6 +224,12 @@ Rendering Render(const Scene& scene,
   Rendering rendering;
   RenderSummary& summary = rendering.summary;
   summary.thread_count_used = ThreadCount(options.thread_count);
+  const bool keep = !checkpoint.path.empty();
+  Accumulator film(scene.film);
+  if (keep && ReadCheckpoint(checkpoint, film)) {
+    summary.samples_resumed = static_cast<int>(
+        SamplesMade(film) / static_cast<std::int64_t>(film.PixelCount()));
+  }
 
   const World world(scene, options.thread_count);
   summary.build_s = total.Seconds();
@@ -208,44 +237,46 @@ Rendering Render(const Scene& scene,
   const Exitances exitances(world, settings, options, progress, summary);
 
   const PathTracer tracer(world, exitances.sources(), settings);
-  Accumulator film(scene.film);
-  Pass pass(scene, tracer, options, film);
-  PassSchedule schedule(options, total.Seconds());
-  const int spp = SamplesAtMost(scene, options);
-  int done = 0;
+  const SamplePlan plan(scene.film,
+                        {.spp = SamplesAtMost(scene, options),
+                         .error_target = options.error_target,
+                         .adaptive = options.adaptive});
+  Pass pass(scene, tracer, options, plan, film);
+  Schedule schedule(options, total.Seconds());
+  const std::int64_t made_before = SamplesMade(film);
+  std::int64_t made = made_before;
   std::mutex report_mutex;
-  while (done < spp && !(options.error_target > 0 &&
-                         film.RelativeError(done) <= options.error_target)) {
-    const int end = NextPassEnd(done, spp);
-    if (!schedule.TimeLeft(done, end - done)) {
+  for (std::vector<int> next = plan.Next(film); !next.empty(); next = plan.Next(film)) {
+    if (!schedule.TimeLeft(made - made_before, plan.SamplesUpTo(next) - made)) {
       summary.time_ran_out = true;
       break;
     }
-    std::int64_t tiles = 0;
     pass.Run(
-        done,
-        end,
-        [&](std::int64_t) {
+        next,
+        [&](std::int64_t samples) {
           const std::lock_guard lock(report_mutex);
-          ++tiles;
-          Report(progress,
-                 {"render",
-                  done * pass.TileCount() + tiles * (end - done),
-                  spp * pass.TileCount(),
-                  ""});
+          made += samples;
+          Report(progress, {"render", made, plan.SamplesAtMost(), ""});
         },
         summary);
-    done = end;
-    if (snapshot && done < spp && schedule.SnapshotDue()) {
-      snapshot(film.ToImage(done));
+    if (snapshot && schedule.SnapshotDue()) {
+      snapshot(film.ToImage());
+    }
+    if (keep && schedule.CheckpointDue()) {
+      WriteCheckpoint(checkpoint, film);
     }
   }
-  summary.samples_per_pixel = done;
-  summary.relative_error = film.RelativeError(done);
+  if (keep) {
+    WriteCheckpoint(checkpoint, film);
+  }
+  DescribeSamples(film, summary);
   summary.paths_s = schedule.Seconds();
   exitances.AddUse(summary.use);
   summary.cpu_s = cpu.Seconds();
-  rendering.image = film.ToImage(done);
+  rendering.image = film.ToImage();
+  if (options.aovs) {
+    rendering.aovs = film.ToAovs();
+  }
   return rendering;
 }
 

@@ -5,6 +5,7 @@
 #include "core/json_fwd.h"
 #include "core/options.h"
 #include "core/progress.h"
+#include "render/checkpoint.h"
 #include "render/scene.h"
 
 #include <cstdint>
@@ -20,6 +21,8 @@ struct RenderOptions {
   int thread_count = 0;
   double time_limit_s = 0;
   double error_target = 0;
+  bool adaptive = false;
+  bool aovs = false;
   double clamp = 0;
   double points_per_patch = 16;
   double max_lit_points = 2e6;
@@ -45,6 +48,16 @@ struct RenderOptions {
           Range{0, 1e3},
           "relative L2 error at which to stop, estimated from the samples' variance; "
           "0: none. Without --spp up to 65536 samples a pixel are made");
+    visit("adaptive",
+          self.adaptive,
+          Range{},
+          "more samples where the picture is noisier: --spp on average, or as many as "
+          "--error-target takes");
+    visit("aovs",
+          self.aovs,
+          Range{},
+          "add parts \"variance\" (of a pixel's mean luminance) and \"samples\" (their "
+          "number) to the picture");
     visit("clamp",
           self.clamp,
           Range{0, 1e30},
@@ -77,7 +90,11 @@ struct RenderOptions {
 struct RenderSummary {
   int width = 0;
   int height = 0;
-  int samples_per_pixel = 0;  ///< made; less than asked for if time ran out
+  int samples_per_pixel =
+      0;                  ///< made, on average; fewer than asked for if time ran out
+  int samples_least = 0;  ///< of any pixel
+  int samples_most = 0;
+  int samples_resumed = 0;  ///< of the average, from a checkpoint
   int thread_count_used = 0;
   bool time_ran_out = false;
   double relative_error = 0;  ///< of the luminance, as Accumulator estimates it
@@ -110,7 +127,8 @@ struct RenderSummary {
 };
 
 struct Rendering {
-  ExrPart image;  ///< linear; channels R, G, B (, A) or Y (, A)
+  ExrPart image;              ///< linear; channels R, G, B (, A) or Y (, A)
+  std::vector<ExrPart> aovs;  ///< "variance", "samples", if wanted
   RenderSummary summary;
 };
 
@@ -118,10 +136,13 @@ struct Rendering {
 using SnapshotFunction = std::function<void(const ExrPart&)>;
 
 /// The same scene, options and seed give the same bits for any number of threads
-/// (unless a time limit cuts the work short).
+/// (unless a time limit cuts the work short), and whether or not the work was
+/// interrupted and taken up again: with a `checkpoint`, the samples are kept there from
+/// time to time and at the end, and those found there are gone on from.
 Rendering Render(const Scene& scene,
                  const RenderOptions& options = {},
                  const ProgressFunction& progress = {},
-                 const SnapshotFunction& snapshot = {});
+                 const SnapshotFunction& snapshot = {},
+                 const Checkpoint& checkpoint = {});
 
 }  // namespace nacre::render

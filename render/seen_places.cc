@@ -108,7 +108,7 @@ std::int64_t SeenPlaces::CellOf(Vec3 position) const {
 }
 
 Color SeenPlaces::At(const SurfaceHit& hit, const ExitanceQuery& query) const {
-  if (query.sharp) {
+  if (query.sight == Sight::kSharp) {
     seen_[static_cast<std::size_t>(CellOf(hit.position))].store(
         1, std::memory_order_relaxed);
   }

@@ -14,6 +14,12 @@ std::string RenderSummary::Brief() const {
       build_s + seen_s + irradiance_s + models_s + paths_s,
       thread_count_used,
       cpu_s);
+  if (samples_least < samples_most) {
+    line += fmt::format(" ({} to {})", samples_least, samples_most);
+  }
+  if (samples_resumed > 0) {
+    line += fmt::format("; {} samples each were there already", samples_resumed);
+  }
   if (time_ran_out) {
     line += "; stopped by the time limit";
   }
@@ -82,6 +88,9 @@ Json RenderSummary::ToJson() const {
   return {{"width", width},
           {"height", height},
           {"spp", samples_per_pixel},
+          {"spp_least", samples_least},
+          {"spp_most", samples_most},
+          {"spp_resumed", samples_resumed},
           {"threads", thread_count_used},
           {"time_ran_out", time_ran_out},
           {"relative_error", relative_error},

@@ -97,10 +97,11 @@ void Run(const Arguments& arguments) {
   std::printf("|---|---|---|---|---|---|\n");
   for (const int spp : arguments.spp) {
     options.spp = spp;
-    const auto [image, summary] = Render(scene, options);
+    const Rendering made = Render(scene, options);
+    const RenderSummary& summary = made.summary;
     const double before =
         summary.build_s + summary.seen_s + summary.irradiance_s + summary.models_s;
-    rows.push_back({summary.cpu_s, RelativeL2(image, truth)});
+    rows.push_back({summary.cpu_s, RelativeL2(made.image, truth)});
     std::printf("| %d | %.1f | %.1f | %.2f %% | %lld | %lld |\n",
                 spp,
                 summary.cpu_s,

@@ -51,8 +51,8 @@ void RenderThumbnail(const MakeInputs& inputs,
   render.spp = options.thumbnail_spp;
   render.thread_count = options.thread_count;
   render.points_per_patch = 4;
-  const auto [image, summary] =
-      render::Render(render::ReadScene(inputs.scene, scene), render, progress);
+  const ExrPart image =
+      render::Render(render::ReadScene(inputs.scene, scene), render, progress).image;
   WritePng(preset.File("thumbnail"), render::ToPng(image, Exposure(image)), 9);
 }
 

@@ -13,6 +13,8 @@ namespace {
 constexpr float kSharpPdf = 10;
 // What is dimmed to less than this needn't be right to a percent.
 constexpr float kSharpThroughput = 0.15F;
+// Paths that bring less than this go on seldom, however short they are.
+constexpr float kLittleWeight = 0.1F;
 
 float PowerHeuristic(float pdf, float other) {
   const float a = pdf * pdf;
@@ -47,7 +49,7 @@ struct PathTracer::State {
   // How the ray was chosen, for what it may find at its end.
   bool count_emission = true;
   bool delta = true;  ///< nothing else could have found it
-  bool sharp = true;  ///< since the camera, nothing but mirrors and the like
+  Sight sight = Sight::kSharp;
   float pdf = 0;
   Vec3 origin{};
   Vec3 side{};
@@ -88,7 +90,7 @@ Color PathTracer::IndirectRadiance(const Ray& ray,
               .depth = 2,
               .max_depth = settings_.max_depth,
               .count_emission = false,
-              .sharp = false};
+              .sight = Sight::kBlurred};
   Trace(state);
   return state.radiance;
 }
@@ -181,17 +183,23 @@ bool PathTracer::Continue(State& state,
   }
   state.throughput *= sample.weight;
   state.eta_scale *= sample.eta * sample.eta;
-  if (state.depth >= settings_.rr_depth) {
-    const float survive =
-        std::min(0.95F, MaxComponent(state.throughput) * state.eta_scale);
+  const float weight = MaxComponent(state.throughput) * state.eta_scale;
+  if (state.depth >= settings_.rr_depth || weight < kLittleWeight) {
+    const float survive = state.depth >= settings_.rr_depth
+                              ? std::min(0.95F, weight)
+                              : std::min(1.0F, weight / kLittleWeight);
     if (state.sampler.Next1D() >= survive) {
       return false;
     }
     state.throughput *= 1 / survive;
   }
   state.delta = sample.delta;
-  state.sharp = state.sharp && (sample.delta || sample.pdf > kSharpPdf) &&
-                MaxComponent(state.throughput) > kSharpThroughput;
+  if (!sample.delta && sample.pdf <= kSharpPdf) {
+    state.sight = Sight::kBlurred;
+  } else if (state.sight == Sight::kSharp &&
+             MaxComponent(state.throughput) <= kSharpThroughput) {
+    state.sight = Sight::kDim;
+  }
   state.pdf = sample.pdf;
   state.origin = hit.position;
   state.side = LitSide(hit, wo);
@@ -209,7 +217,7 @@ Color PathTracer::TranslucentRadiance(State& state,
   const float transmitted =
       1 - FresnelDielectric(cosine, hit.shape->translucency->model->Eta());
   return exitances_[hit.shape_index]->At(hit,
-                                         {state.sampler, state.counters, state.sharp}) *
+                                         {state.sampler, state.counters, state.sight}) *
          (transmitted * exit_scale_[hit.shape_index]);
 }
 

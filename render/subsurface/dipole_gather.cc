@@ -19,11 +19,12 @@ class DipoleGather final : public Subsurface {
  public:
   DipoleGather(const ProfileTriple& profiles,
                std::vector<Patch> patches,
-               double max_relative_extent,
+               const DipoleOptions& options,
                int thread_count)
       : table_(profiles, LargestDisc(patches), thread_count),
         tree_(std::move(patches)),
-        max_relative_extent_(static_cast<float>(max_relative_extent)) {
+        max_relative_extent_(static_cast<float>(options.max_relative_extent)),
+        negligible_(static_cast<float>(options.negligible)) {
     for (const Patch& patch : tree_.patches()) {
       patches_.push_back({ToLanes(patch.flux_w), patch.point.normal, Disc2(patch)});
     }
@@ -35,10 +36,14 @@ class DipoleGather final : public Subsurface {
   Color Gather(const SurfacePoint& x_o, std::int64_t& pairs) const override {
     ColorLanes sum;
     std::int64_t asked = 0;
+    const auto is_small = tree_.SmallerThan(max_relative_extent_);
+    const float little = negligible_ * AtLeast(x_o.position_mm);
     tree_.Visit(
         x_o.position_mm,
-        max_relative_extent_,
         table_.reach_mm(),
+        [&](std::int32_t node, float distance2) {
+          return is_small(node, distance2) || IsLittle(node, distance2, little);
+        },
         [&](std::int32_t node, Vec3 d_mm) {
           const Source& source = nodes_[static_cast<std::size_t>(node)];
           ++asked;
@@ -62,6 +67,38 @@ class DipoleGather final : public Subsurface {
     float extent_mm2;  ///< squared radius of a patch, variance of a node
   };
 
+  static float Total(const ColorLanes& flux_w) {
+    return flux_w.v[0] + flux_w.v[1] + flux_w.v[2];
+  }
+
+  /// A lower bound of what is gathered at x (of a sum over channels): of some node
+  /// around it, all flux, carried to the farthest of its patches.
+  float AtLeast(Vec3 x_mm) const {
+    float bound = 0;
+    tree_.Descend(x_mm, [&](std::int32_t n) {
+      const PatchTree::Node& node = tree_.nodes()[static_cast<std::size_t>(n)];
+      const float farthest = Length(x_mm - node.centre_mm) + node.radius_mm;
+      bound = std::max(bound,
+                       table_.AtLeast(farthest * farthest) *
+                           Total(nodes_[static_cast<std::size_t>(n)].flux_w));
+    });
+    return bound;
+  }
+
+  /// Whether the error of taking a node as one source, of second order in its extent
+  /// over its distance, is below `little`.
+  bool IsLittle(std::int32_t n, float distance2, float little) const {
+    const float radius = tree_.nodes()[static_cast<std::size_t>(n)].radius_mm;
+    constexpr float kNear2 = 2;  // below √2 radii away, nothing is
+    if (radius * radius * kNear2 > distance2) {
+      return false;
+    }
+    const float nearest = std::sqrt(distance2) - radius;
+    return Total(nodes_[static_cast<std::size_t>(n)].flux_w) *
+               table_.AtMost(nearest * nearest) * radius * radius <
+           little * distance2;
+  }
+
   static DipoleTable::Distance DistanceOf(Vec3 d_mm, const Source& source) {
     const float squared = Dot(d_mm, d_mm);
     const float out_of_plane = Dot(d_mm, source.normal);
@@ -83,6 +120,7 @@ class DipoleGather final : public Subsurface {
   std::vector<Source> patches_;
   std::vector<Source> nodes_;
   float max_relative_extent_;
+  float negligible_;
 };
 
 class Dipole final : public SubsurfaceModel {
@@ -117,10 +155,8 @@ class Dipole final : public SubsurfaceModel {
   }
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int thread_count) const override {
-    return std::make_unique<DipoleGather>(profiles_,
-                                          GatherPatches(lit, patch_mm_),
-                                          options_.max_relative_extent,
-                                          thread_count);
+    return std::make_unique<DipoleGather>(
+        profiles_, GatherPatches(lit, patch_mm_), options_, thread_count);
   }
 
  private:

@@ -84,6 +84,8 @@ void DipoleTable::FillFar(const ProfileTriple& profiles) {
       far_[i].slope.v[c] = static_cast<float>(spread.slope);
       far_[i].bend.v[c] = static_cast<float>(spread.bend);
     }
+    const auto& rd = far_[i].rd.v;
+    total_.push_back(rd[0] + rd[1] + rd[2]);
   }
 }
 

@@ -74,6 +74,11 @@ class DipoleTable {
               const ColorLanes& flux,
               ColorLanes& sum) const;
 
+  /// Bounds of R_d, summed over channels, at a squared distance: the tabulated values
+  /// on both sides.
+  float AtLeast(float r2_mm2) const { return total_[far_axis_.Find(r2_mm2).index + 1]; }
+  float AtMost(float r2_mm2) const { return total_[far_axis_.Find(r2_mm2).index]; }
+
   /// Beyond this, nothing.
   float reach_mm() const { return reach_mm_; }
 
@@ -91,6 +96,7 @@ class DipoleTable {
   float reach_mm_ = 0;
   SquaredDistanceAxis far_axis_;
   std::vector<FarEntry> far_;
+  std::vector<float> total_;  ///< R_d of all channels, as far_
   SquaredDistanceAxis near_axis_;
   SquaredRadiusAxis disc_axis_;
   std::vector<ColorLanes> near_;  ///< a row for each squared radius

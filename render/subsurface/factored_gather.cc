@@ -67,8 +67,8 @@ class FactoredGather final : public Subsurface {
     };
     tree_.Visit(
         x_o.position_mm,
-        max_relative_extent_,
         reach_mm_,
+        tree_.SmallerThan(max_relative_extent_),
         [&](std::int32_t index, Vec3 d_mm) {
           const Source& node = nodes_[static_cast<std::size_t>(index)];
           if (!AddCluster(node, d_mm, lookups)) {

@@ -21,6 +21,9 @@ struct DipoleOptions {
   /// A cluster of patches counts as one source if its diameter is below this fraction
   /// of its distance. 0 gathers every patch.
   double max_relative_extent = 0.5;
+  /// A cluster also counts as one source if the error of that is below this fraction of
+  /// what is gathered.
+  double negligible = 2e-4;
   /// Side of the patches in transport mean free paths of the most scattering channel.
   double patch_mean_free_paths = 0.8;
 
@@ -30,6 +33,10 @@ struct DipoleOptions {
           self.max_relative_extent,
           Range{0, 1},
           "cluster diameter / distance below which a cluster is one source");
+    visit("negligible",
+          self.negligible,
+          Range{0, 1},
+          "error of a cluster, of all that is gathered, below which it is one source");
     visit("patch_mean_free_paths",
           self.patch_mean_free_paths,
           Range{0.05, 8},

@@ -30,18 +30,16 @@ class PatchTree {
   const std::vector<Node>& nodes() const { return nodes_; }
 
   /// Visits every patch nearer to x than `reach_mm` exactly once: on its own,
-  /// on_patch(index, x − centre), or as part of a node whose diameter is less than
-  /// `max_relative_extent` of its distance, on_node(index, x − centre). What is farther
-  /// may be visited too.
-  template <class OnNode, class OnPatch>
+  /// on_patch(index, x − centre), or as part of a node for which stands(index, squared
+  /// distance) says yes, on_node(index, x − centre). What is farther may be visited
+  /// too.
+  template <class Stands, class OnNode, class OnPatch>
   void Visit(Vec3 x_mm,
-             float max_relative_extent,
              float reach_mm,
+             Stands&& stands,
              OnNode&& on_node,
              OnPatch&& on_patch) const {
     const auto node_count = static_cast<std::int32_t>(nodes_.size());
-    // diameter < ε distance, squared
-    const float open2 = 4 / (max_relative_extent * max_relative_extent);
     for (std::int32_t n = 0; n < node_count;) {
       const Node& node = nodes_[static_cast<std::size_t>(n)];
       const Vec3 d = x_mm - node.centre_mm;
@@ -49,8 +47,7 @@ class PatchTree {
       const float far = reach_mm + node.radius_mm;
       if (distance2 > far * far) {
         n = node.next;
-      } else if (node.end - node.begin > 1 &&
-                 node.radius_mm * node.radius_mm * open2 < distance2) {
+      } else if (node.end - node.begin > 1 && stands(n, distance2)) {
         on_node(n, d);
         n = node.next;
       } else if (node.next == n + 1) {
@@ -59,6 +56,40 @@ class PatchTree {
       } else {
         ++n;
       }
+    }
+  }
+
+  /// Whether the diameter of a node is less than `max_relative_extent` of a distance.
+  auto SmallerThan(float max_relative_extent) const {
+    return [this, open2 = 4 / (max_relative_extent * max_relative_extent)](
+               std::int32_t n, float distance2) {
+      const float radius = nodes_[static_cast<std::size_t>(n)].radius_mm;
+      return radius * radius * open2 < distance2;
+    };
+  }
+
+  /// Calls visit(index) for nodes from the root down to a leaf, of the children always
+  /// the one whose centre is nearest to x.
+  template <class Visitor>
+  void Descend(Vec3 x_mm, Visitor&& visit) const {
+    const auto distance2 = [&](std::int32_t n) {
+      const Vec3 d = x_mm - nodes_[static_cast<std::size_t>(n)].centre_mm;
+      return Dot(d, d);
+    };
+    for (std::int32_t n = 0; n < static_cast<std::int32_t>(nodes_.size());) {
+      visit(n);
+      const std::int32_t end = nodes_[static_cast<std::size_t>(n)].next;
+      if (end == n + 1) {
+        return;
+      }
+      std::int32_t nearest = n + 1;
+      for (std::int32_t child = n + 1; child < end;
+           child = nodes_[static_cast<std::size_t>(child)].next) {
+        if (distance2(child) < distance2(nearest)) {
+          nearest = child;
+        }
+      }
+      n = nearest;
     }
   }
 

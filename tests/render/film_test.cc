@@ -61,7 +61,7 @@ TEST(AccumulatorTest, LeavesOutWhatIsNotFinite) {
   EXPECT_FALSE(sums.Add(0, {std::numeric_limits<float>::quiet_NaN(), 0, 0}, 1, 1));
   EXPECT_FALSE(sums.Add(1, {0, std::numeric_limits<float>::infinity(), 0}, 1, 1));
   EXPECT_TRUE(sums.Add(1, {2, 2, 2}, 1, 1));
-  const ExrPart image = sums.ToImage(2);
+  const ExrPart image = sums.ToImage();
   EXPECT_EQ(image.Channel(0)[0], 1);
   EXPECT_EQ(image.Channel(2)[0], 3);
   EXPECT_EQ(image.Channel(1)[1], 2);
@@ -72,12 +72,12 @@ TEST(AccumulatorTest, EstimatesTheErrorThatIndependentSamplesLeave) {
   film.crop_width = 1;
   film.crop_height = 1;
   Accumulator sums(film);
-  EXPECT_TRUE(std::isinf(sums.RelativeError(0)));
+  EXPECT_TRUE(std::isinf(sums.RelativeError()));
   // 1, 3, 1, 3: mean 2, variance of the mean 4/3 / 4, so relative error √(1/3) / 2.
   for (const float v : {1.0F, 3.0F, 1.0F, 3.0F}) {
     sums.Add(0, {v, v, v}, 1, 1);
   }
-  EXPECT_NEAR(sums.RelativeError(4), std::sqrt(1.0 / 3) / 2, 1e-6);
+  EXPECT_NEAR(sums.RelativeError(), std::sqrt(1.0 / 3) / 2, 1e-6);
 }
 
 TEST(AccumulatorTest, WritesTheChannelsOfTheFormat) {
@@ -87,7 +87,7 @@ TEST(AccumulatorTest, WritesTheChannelsOfTheFormat) {
   film.format = PixelFormat::kLuminanceAlpha;
   Accumulator sums(film);
   sums.Add(0, {1, 1, 1}, 0.5F, 1);
-  const ExrPart image = sums.ToImage(1);
+  const ExrPart image = sums.ToImage();
   EXPECT_EQ(image.channels, (std::vector<std::string>{"Y", "A"}));
   EXPECT_NEAR(image.Channel(0)[0], 1, 1e-6);
   EXPECT_EQ(image.Channel(1)[0], 0.5F);

@@ -123,11 +123,11 @@ TEST(SeenPlacesTest, DistancesAreThoseToWhatWasSeen) {
   PathCounters counters;
   std::vector<Vec3> places;
   for (const Vec3 p : {Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0.6F, -0.8F, 0}}) {
-    seen.At(SpherePoint(scene.shapes[0], p), {sampler, counters, true});
+    seen.At(SpherePoint(scene.shapes[0], p), {sampler, counters, Sight::kSharp});
     places.push_back(p);
   }
   // What is blurred needs no close look.
-  seen.At(SpherePoint(scene.shapes[0], {0, 0, -1}), {sampler, counters, false});
+  seen.At(SpherePoint(scene.shapes[0], {0, 0, -1}), {sampler, counters, Sight::kBlurred});
   seen.Finish();
   EXPECT_EQ(seen.seen_count(), 3);
   const AreaSampler area(scene.shapes[0]);
@@ -208,7 +208,7 @@ TEST(LazyTest, AreaIsKeptWhateverIsLeftOut) {
   SeenPlaces seen(scene.shapes[0]);
   Sampler sampler(1, 0);
   PathCounters counters;
-  seen.At(MeshPoint(scene.shapes[0], 0, {0.1F, 0.1F}), {sampler, counters, true});
+  seen.At(MeshPoint(scene.shapes[0], 0, {0.1F, 0.1F}), {sampler, counters, Sight::kSharp});
   seen.Finish();
   const World world(scene, 1);
   const ExitanceSources dark(1);

@@ -149,7 +149,7 @@ TEST(DipoleGather, ClustersAgreeWithEveryPatchOnItsOwn) {
     return Color{1, 1, 1} * std::max(0.0F, p.x / 8 + 0.3F * p.y / 8);
   };
   const auto clustered = MakeDipole(kMarble);
-  const auto every = MakeDipole(kMarble, {.max_relative_extent = 0});
+  const auto every = MakeDipole(kMarble, {.max_relative_extent = 0, .negligible = 0});
   const auto points = LightSphere(8, clustered->PatchSizeMm() / 2, light);
   const auto a = clustered->Illuminate(points, 2);
   const auto b = every->Illuminate(points, 2);

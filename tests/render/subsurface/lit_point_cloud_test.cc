@@ -115,8 +115,8 @@ TEST(PatchTree, VisitsEveryPatchOnce) {
     int nodes = 0;
     tree.Visit(
         {5, 0, 0},
-        extent,
         100,
+        tree.SmallerThan(extent),
         [&](std::int32_t n, Vec3) {
           ++nodes;
           const PatchTree::Node& node = tree.nodes()[static_cast<std::size_t>(n)];
@@ -139,7 +139,7 @@ TEST(PatchTree, StopsAtItsReach) {
                                      0.5F));
   std::size_t visited = 0;
   const auto count = [&](std::int32_t, Vec3) { ++visited; };
-  tree.Visit({5, 0, 0}, 0, 1, count, count);
+  tree.Visit({5, 0, 0}, 1, tree.SmallerThan(0), count, count);
   EXPECT_GT(visited, 5u);
   EXPECT_LT(visited, tree.patches().size() / 10);
 }

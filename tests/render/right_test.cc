@@ -1,0 +1,127 @@
+// The bars of "right": fast is reference, and tessellation doesn't show.
+
+#include "render/lit_points.h"
+#include "tests/render/bias.h"
+#include "tests/render/scene_text.h"
+
+namespace nacre::render::testing {
+namespace {
+
+const char* const kDipole =
+    R"(<subsurface type="dipole"><rgb name="sigmaS" value="1, 2, 3"/>
+  <rgb name="sigmaA" value="0.05, 0.02, 0.01"/><float name="scale" value="5"/>
+  </subsurface>)";
+
+const char* const kSun = R"(
+  <emitter type="directional"><vector name="direction" x="1" y="-0.5" z="-1"/>
+    <rgb name="irradiance" value="3"/></emitter>)";
+const char* const kSky = R"(
+  <integrator type="path"><boolean name="hideEmitters" value="true"/></integrator>
+  <emitter type="constant"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>)";
+
+ExrPart Picture(const Scene& scene, const char* integrator, int spp, int seed) {
+  RenderOptions options;
+  options.integrator = integrator;
+  options.spp = spp;
+  options.seed = static_cast<std::uint64_t>(seed);
+  return Render(scene, options).image;
+}
+
+TEST(RightTest, FastIsReferenceOnSlabSphereAndCube) {
+  for (const char* shape :
+       {R"(<shape type="rectangle"><transform name="toWorld"><scale value="1.5"/>
+           </transform>)",
+        "<shape type=\"sphere\">",
+        "<shape type=\"cube\">"}) {
+    const Scene scene =
+        Parse(SceneText(std::string(kSun) + kSky + shape + kDipole + "</shape>",
+                        "3, 4, 6",
+                        "0, 0, 0",
+                        8));
+    const Difference d = Compare(Picture(scene, "fast", 256, 1),
+                                 Picture(scene, "fast", 256, 2),
+                                 Picture(scene, "reference", 4096, 3),
+                                 Picture(scene, "reference", 4096, 4));
+    EXPECT_LT(d.noise, 0.02) << shape;
+    EXPECT_LT(d.bias, 0.01) << shape << " (at most " << d.bound << ")";
+  }
+}
+
+// Every triangle by four, twice.
+TriangleMesh Subdivided(const TriangleMesh& mesh) {
+  TriangleMesh fine = mesh;
+  fine.triangles.clear();
+  const auto middle = [&](std::uint32_t a, std::uint32_t b) {
+    const auto index = static_cast<std::uint32_t>(fine.positions.size());
+    fine.positions.push_back((fine.positions[a] + fine.positions[b]) * 0.5F);
+    if (!fine.normals.empty()) {
+      fine.normals.push_back(Normalized(fine.normals[a] + fine.normals[b]));
+    }
+    if (!fine.uvs.empty()) {
+      const Vec2 u = fine.uvs[a];
+      const Vec2 v = fine.uvs[b];
+      fine.uvs.push_back({0.5F * (u.x + v.x), 0.5F * (u.y + v.y)});
+    }
+    return index;
+  };
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const std::uint32_t ab = middle(a, b);
+    const std::uint32_t bc = middle(b, c);
+    const std::uint32_t ca = middle(c, a);
+    fine.triangles.insert(fine.triangles.end(),
+                          {{a, ab, ca}, {ab, b, bc}, {ca, bc, c}, {ab, bc, ca}});
+  }
+  return fine;
+}
+
+TEST(RightTest, SixteenTrianglesForOneGiveTheSamePicture) {
+  Scene scene = Parse(
+      SceneText(std::string(kSun) + "<shape type=\"cube\">" + kDipole + "</shape>",
+                "3, 4, 6",
+                "0, 0, 0",
+                16));
+  const ExrPart coarse = Picture(scene, "fast", 16, 1);
+  auto& mesh = std::get<TriangleMesh>(scene.shapes[0].geometry);
+  mesh = Subdivided(Subdivided(mesh));
+  ASSERT_EQ(mesh.triangles.size(), 12u * 16);
+  const ExrPart fine = Picture(scene, "fast", 16, 1);
+  // Noise of the lit points included; that of the film is the same in both.
+  EXPECT_LT(Compare(fine, fine, coarse, coarse).total, 0.005);
+}
+
+// Light far from what is seen counts as much as if it were found closely, also where a
+// triangle has neither few points nor very many.
+TEST(LitPointsTest, ThinnedTrianglesKeepTheirArea) {
+  Scene scene = Parse(SceneText(std::string(kSun) +
+                                R"(<shape type="rectangle"><transform name="toWorld">
+      <scale x="10" y="1"/></transform>)" +
+                                kDipole + "</shape>"));
+  auto& mesh = std::get<TriangleMesh>(scene.shapes[0].geometry);
+  mesh = Subdivided(Subdivided(mesh));
+  SeenPlaces seen(scene.shapes[0]);
+  Sampler sampler(1, 0);
+  PathCounters counters;
+  SurfaceHit end;
+  end.position = {-10, 0, 0};
+  seen.At(end, {sampler, counters, Sight::kSharp});
+  seen.Finish();
+  const World world(scene, 1);
+  const ExitanceSources dark(1);
+  const PathTracer tracer(world, dark, scene.integrator);
+  // 16 triangles for each of two, with 88 and 884 points unless they are thinned.
+  for (const double points : {0.2, 2.0}) {
+    const LitPoints lit =
+        SampleLitPoints(world, 0, tracer, {.points_per_patch = points, .seen = &seen});
+    EXPECT_GT(lit.skipped, std::ssize(lit.points));
+    // Of 100 mm, the 25 next to what is seen. A point left alone in its triangle lies
+    // in a corner, and on the border counts for the neighbours.
+    double near = 0;
+    for (const LitPoint& point : lit.points) {
+      near += point.point.position_mm.x < -25 ? static_cast<double>(point.area_mm2) : 0;
+    }
+    EXPECT_NEAR(near / lit.area_mm2, 0.25, 0.08) << points;
+  }
+}
+
+}  // namespace
+}  // namespace nacre::render::testing
