@@ -206,6 +206,12 @@ Calibration Calibrate(const acquire::SessionReader& session,
   FluxResult flux =
       EstimateFluxScales(session, f.geometry.camera, f.laser.map, pictures, transfer);
   calibration.channels = std::move(flux.channels);
+  for (ChannelResponse& channel : calibration.channels) {
+    channel.flux_scale_sigma =
+        std::hypot(channel.flux_scale_sigma,
+                   options.reference_reflectance_sigma /
+                       session.rig().targets.reference_reflectance);
+  }
   corrections.spots = std::move(flux.spots);
   corrections.light_noise = flux.light_noise;
   calibration.diagnostics = DiagnosticsOf(f);

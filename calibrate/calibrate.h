@@ -10,6 +10,7 @@ namespace nacre::calibrate {
 struct CalibrateOptions {
   double max_reprojection_rms_px = 0.5;
   double max_laser_map_rms_mm = 0.1;
+  double reference_reflectance_sigma = 0;
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -21,6 +22,11 @@ struct CalibrateOptions {
           self.max_laser_map_rms_mm,
           Range{0, 100},
           "refuse a laser map that fits worse");
+    visit("reference_reflectance_sigma",
+          self.reference_reflectance_sigma,
+          Range{0, 1},
+          "standard uncertainty of the rig's reference_reflectance, from its "
+          "certificate (often 0.005); 0: exact");
   }
 };
 

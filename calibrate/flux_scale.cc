@@ -178,6 +178,26 @@ Discs DiscsOf(const acquire::SessionReader& session,
   return discs;
 }
 
+// Standard uncertainty of a channel's scale, relative: the spots' scatter, and what all
+// spots share of the dark's, the response's and the glare's.
+double FluxSigma(const RatePictures& pictures,
+                 const PhotonTransfer& transfer,
+                 const ChannelSums& sums,
+                 const Discs& discs,
+                 double mean) {
+  const auto n = static_cast<double>(discs.spots.size());
+  const double area_mm2 = std::numbers::pi * discs.reach_mm * discs.reach_mm;
+  const DarkLevel& dark = pictures.dark().level;
+  const double dark_rate = std::hypot(dark.offset_sigma_counts / sums.exposure_us,
+                                      dark.rate_sigma_counts_per_us);
+  const float brightest = *std::max_element(sums.mean.begin(), sums.mean.end());
+  const double bent = pictures.linearity().sigma_at_saturation *
+                      static_cast<double>(brightest) * sums.exposure_us /
+                      transfer.saturation_counts;
+  return std::hypot(std::hypot(sums.powers.spread / std::sqrt(n), bent),
+                    std::hypot(pictures.glare_sigma(), dark_rate * area_mm2 / mean));
+}
+
 }  // namespace
 
 double SpotSigmaMm(const acquire::SessionReader& session,
@@ -232,14 +252,12 @@ FluxResult EstimateFluxScales(const acquire::SessionReader& session,
                                 session.folder().string(),
                                 names[static_cast<std::size_t>(channel)]));
     }
-    const double spread = read.powers.spread;
     result.channels.push_back(
         {.name = names[static_cast<std::size_t>(channel)],
          .flux_scale_counts_mm2_sr_per_us =
              mean * std::numbers::pi / targets.reference_reflectance,
-         .flux_scale_spread = spread,
-         .flux_scale_sigma =
-             spread / std::sqrt(static_cast<double>(discs.spots.size()))});
+         .flux_scale_spread = read.powers.spread,
+         .flux_scale_sigma = FluxSigma(pictures, transfer, read, discs, mean)});
     result.spots.push_back(sums.Profile(ground, read.one_way));
     read.powers.sampling = SamplingVariance(
         pictures.PlaneCount(channel), result.spots.back(), discs.pixel_mm);

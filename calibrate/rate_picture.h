@@ -47,6 +47,8 @@ class RatePictures {
     return PixelShares(filters_, channel, width, height);
   }
 
+  /// Standard uncertainty of a spot's light for what glare isn't known of, relative.
+  double glare_sigma() const { return glare_sigma_; }
   const DarkResult& dark() const { return dark_; }
   const Linearity& linearity() const { return linearity_; }
 
@@ -57,6 +59,7 @@ class RatePictures {
   std::vector<float> ambient_;
   std::vector<float> flat_;
   std::unique_ptr<GlareFilter> glare_;
+  double glare_sigma_ = 0;
   double kept_ = 1;  // of a point's light, by what glare leaves it
 };
 

@@ -4,6 +4,7 @@
 #include "core/error.h"
 #include "core/fresnel.h"
 #include "core/json.h"
+#include "tests/support/error_message.h"
 #include "tests/support/temp_folder.h"
 
 #include <gmock/gmock.h>
@@ -163,6 +164,62 @@ TEST(CalibrationFile, RoundTripKeepsEveryBit) {
   EXPECT_EQ(read.scan_map, SomeCalibration().scan_map);
   EXPECT_EQ(read.dark.rate_counts_per_us, 1e-4);
   EXPECT_EQ(read.session_rig_hash, "abc");
+}
+
+TEST(CalibrationFile, TheFirstVersionIsStillRead) {
+  const TempFolder folder;
+  WriteCalibration(folder / "c.json", SomeCalibration());
+  Json json = ReadJson(folder / "c.json");
+  json["format_version"] = 1;
+  for (const char* key : {"corrections",
+                          "diagnostics",
+                          "dark_offset_sigma_counts",
+                          "dark_rate_sigma_counts_per_us",
+                          "gain_sigma_electrons_per_count",
+                          "read_noise_sigma_electrons",
+                          "focal_sigma_px",
+                          "centre_sigma_px",
+                          "height_sigma_mm",
+                          "laser_map_held_out_rms_mm"}) {
+    EXPECT_EQ(json.erase(key), 1U) << key;
+  }
+  for (Json& channel : json["channels"]) {
+    channel.erase("flux_scale_sigma");
+  }
+  WriteJson(folder / "c.json", json);
+  const Calibration read = ReadCalibration(folder / "c.json");
+  EXPECT_EQ(read.channels[0].flux_scale_counts_mm2_sr_per_us, 700.25);
+  EXPECT_EQ(read.channels[0].flux_scale_sigma, 0);
+  EXPECT_TRUE(read.corrections.glare.empty());
+  EXPECT_TRUE(read.corrections.filters.mosaic.empty());
+  EXPECT_EQ(read.corrections.linearity.Linear(1000), 1000);
+  EXPECT_EQ(read.corrections.flat_field.At(0.5, 0.5), 1);
+}
+
+TEST(CalibrationFile, FiltersSurviveAndAreChecked) {
+  const TempFolder folder;
+  Calibration calibration = SomeCalibration();
+  calibration.corrections.filters = {
+      .mosaic = "GBRG", .white = {0.5, 1, 0.6}, .lasers = {{1, 0.1, 0}, {0.2, 1, 0.3}}};
+  WriteCalibration(folder / "c.json", calibration);
+  const Calibration read = ReadCalibration(folder / "c.json");
+  EXPECT_EQ(read.corrections.filters.mosaic, "GBRG");
+  EXPECT_EQ(read.corrections.filters.white, calibration.corrections.filters.white);
+  EXPECT_EQ(read.corrections.filters.lasers, calibration.corrections.filters.lasers);
+  const Json whole = ReadJson(folder / "c.json");
+  const std::pair<const char*, Json> bad[] = {{"mosaic", "RGRG"},
+                                              {"white", {0.5, 1}},
+                                              {"white", {0.5, 1.5, 1}},
+                                              {"lasers", {{1, 0.1, 0}}},
+                                              {"lasers", {{1, 0, 0}, {0, 0, 0}}}};
+  for (const auto& [key, value] : bad) {
+    Json json = whole;
+    json["corrections"]["filters"][key] = value;
+    WriteJson(folder / "d.json", json);
+    EXPECT_THAT(testing::ErrorMessage([&] { ReadCalibration(folder / "d.json"); }),
+                HasSubstr("'" + std::string(key) + "'"))
+        << value;
+  }
 }
 
 TEST(CalibrationFile, TruncatedAnywhereIsBadData) {
