@@ -1,6 +1,7 @@
 #pragma once
 
 #include "render/bsdf/bsdfs.h"
+#include "render/medium.h"
 #include "render/mesh.h"
 #include "render/subsurface/subsurface.h"
 #include "render/transform.h"
@@ -39,6 +40,8 @@ struct Shape {
   std::optional<Color> radiance;  ///< emitted on the outside
   float sampling_weight = 1;      ///< of the emission, among the lights
   std::optional<Translucency> translucency;
+  MediumPtr interior;  ///< behind the surface; null: what is outside is inside too
+  MediumPtr exterior;
   bool instanced = false;  ///< is only where a `ShapeInstance` puts it
 };
 

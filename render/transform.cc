@@ -115,26 +115,46 @@ Vec3 Transform::Point(Vec3 p) const {
                   m_[8] * x + m_[9] * y + m_[10] * z + m_[11]);
 }
 
+// Of the upper left 3 × 3: the inverse transpose times the determinant.
+double Transform::Cofactor(int row, int column) const {
+  const int r1 = (row + 1) % 3;
+  const int r2 = (row + 2) % 3;
+  const int c1 = (column + 1) % 3;
+  const int c2 = (column + 2) % 3;
+  return (*this)(r1, c1) * (*this)(r2, c2) - (*this)(r1, c2) * (*this)(r2, c1);
+}
+
 Vec3 Transform::Normal(Vec3 n) const {
-  // The cofactor matrix is the inverse transpose times the determinant, whose sign must
-  // be undone; it exists even where the inverse does not.
-  const auto cofactor = [&](int row, int column) {
-    const int r1 = (row + 1) % 3;
-    const int r2 = (row + 2) % 3;
-    const int c1 = (column + 1) % 3;
-    const int c2 = (column + 2) % 3;
-    return (*this)(r1, c1) * (*this)(r2, c2) - (*this)(r1, c2) * (*this)(r2, c1);
-  };
+  // The cofactors exist even where the inverse does not; the sign of the determinant
+  // must be undone.
   std::array<double, 3> v{};
   for (int row = 0; row < 3; ++row) {
     for (int k = 0; k < 3; ++k) {
-      v[static_cast<std::size_t>(row)] += cofactor(row, k) * static_cast<double>(n[k]);
+      v[static_cast<std::size_t>(row)] += Cofactor(row, k) * static_cast<double>(n[k]);
     }
   }
   const double sign = Determinant() < 0 ? -1 : 1;
   const double length = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
   const double scale = length > 0 ? sign / length : 0;
   return MakeVec3(v[0] * scale, v[1] * scale, v[2] * scale);
+}
+
+Transform Transform::Inverse() const {
+  const double determinant = Determinant();
+  if (determinant == 0) {
+    throw BadData("a transform that flattens has no inverse");
+  }
+  std::array<double, 16> m{};
+  for (int row = 0; row < 3; ++row) {
+    const auto start = static_cast<std::size_t>(4 * row);
+    for (int k = 0; k < 3; ++k) {
+      const double entry = Cofactor(k, row) / determinant;
+      m[start + static_cast<std::size_t>(k)] = entry;
+      m[start + 3] -= entry * (*this)(k, 3);
+    }
+  }
+  m[15] = 1;
+  return Transform(m);
 }
 
 double Transform::Determinant() const {

@@ -29,10 +29,14 @@ class Transform {
   Vec3 Vector(Vec3 v) const;
   /// By the inverse transpose, unit length; outward stays outward under mirroring.
   Vec3 Normal(Vec3 n) const;
+  /// Throws Error if there is none.
+  Transform Inverse() const;
   double Determinant() const;  ///< of the upper left 3 × 3
   double operator()(int row, int column) const;
 
  private:
+  double Cofactor(int row, int column) const;
+
   std::array<double, 16> m_;
 };
 

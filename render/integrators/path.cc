@@ -2,7 +2,7 @@
 
 #include "core/fresnel.h"
 #include "render/bsdf/fresnel.h"
-#include "render/warp.h"
+#include "render/integrators/path_state.h"
 
 #include <cmath>
 
@@ -11,19 +11,11 @@ namespace {
 
 // What a lobe of less than a tenth of a steradian shows can be made out.
 constexpr float kSharpPdf = 10;
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
 // What is dimmed to less than this needn't be right to a percent.
 constexpr float kSharpThroughput = 0.15F;
 // Paths that bring less than this go on seldom, however short they are.
 constexpr float kLittleWeight = 0.1F;
-
-float PowerHeuristic(float pdf, float other) {
-  const float a = pdf * pdf;
-  return a / (a + other * other);
-}
-
-bool IsBlack(Color c) {
-  return c.x == 0 && c.y == 0 && c.z == 0;
-}
 
 // Where light may come from: World::SampleLight's `side`.
 Vec3 LitSide(const SurfaceHit& hit, Vec3 wo) {
@@ -35,31 +27,12 @@ Vec3 LitSide(const SurfaceHit& hit, Vec3 wo) {
 
 }  // namespace
 
-struct PathTracer::State {
-  Ray ray;
-  Sampler& sampler;
-  PathCounters& counters;
-  int depth = 1;  ///< number of the edge that `ray` is
-  int max_depth;
-  Color radiance{};
-  float alpha = 0;
-  Color throughput{1, 1, 1};
-  float eta_scale = 1;  ///< undoes the index of the medium in Russian roulette
-
-  // How the ray was chosen, for what it may find at its end.
-  bool count_emission = true;
-  bool delta = true;  ///< nothing else could have found it
-  Sight sight = Sight::kSharp;
-  float pdf = 0;
-  Vec3 origin{};
-  Vec3 side{};
-};
-
 PathTracer::PathTracer(const World& world,
                        const ExitanceSources& exitances,
                        const IntegratorSettings& settings)
     : world_(world), exitances_(exitances), settings_(settings) {
   for (const Shape& shape : world.scene().shapes) {
+    has_media_ = has_media_ || shape.interior != nullptr || shape.exterior != nullptr;
     const double eta = shape.translucency
                            ? static_cast<double>(shape.translucency->model->Eta())
                            : 1.0;
@@ -102,7 +75,17 @@ void PathTracer::Trace(State& state) const {
   while (state.max_depth < 0 || state.depth <= state.max_depth) {
     ++state.counters.rays;
     SurfaceHit hit;
-    if (!world_.geometry().Intersect(state.ray, hit)) {
+    const bool found = world_.geometry().Intersect(state.ray, hit);
+    if (state.medium != nullptr) {
+      const MediumEvent event = CrossMedium(state, found ? hit.distance : kInfinity);
+      if (event == MediumEvent::kScattered) {
+        continue;
+      }
+      if (event == MediumEvent::kEnded) {
+        return;
+      }
+    }
+    if (!found) {
       if (state.count_emission) {
         const float other =
             state.delta ? 0 : world_.BackgroundPdf(state.side, state.ray.direction);
@@ -111,6 +94,11 @@ void PathTracer::Trace(State& state) const {
             state.throughput * world_.Background(state.ray.direction) * weight;
       }
       return;
+    }
+    if (has_media_ && IsBoundaryOfMedia(*hit.shape)) {
+      state.medium = MediumBeyond(hit, state.ray.direction, state.medium);
+      state.ray = {OffsetOrigin(hit, state.ray.direction), state.ray.direction};
+      continue;
     }
     state.alpha = 1;
     const Vec3 to_viewer = -state.ray.direction;
@@ -160,11 +148,24 @@ void PathTracer::AddDirectLight(State& state,
     return;
   }
   ++state.counters.shadow_rays;
-  if (world_.geometry().Occluded(ShadowRay(hit, light))) {
-    return;
-  }
+  const Color arriving = LightArriving(state, hit, light);
   const float weight = light.delta ? 1 : PowerHeuristic(light.pdf, bsdf.pdf);
-  state.radiance += state.throughput * bsdf.value * light.radiance * weight;
+  state.radiance += state.throughput * bsdf.value * arriving * weight;
+}
+
+// Russian roulette.
+bool PathTracer::Survives(State& state) const {
+  const float weight = MaxComponent(state.throughput) * state.eta_scale;
+  if (state.depth >= settings_.rr_depth || weight < kLittleWeight) {
+    const float survive = state.depth >= settings_.rr_depth
+                              ? std::min(0.95F, weight)
+                              : std::min(1.0F, weight / kLittleWeight);
+    if (state.sampler.Next1D() >= survive) {
+      return false;
+    }
+    state.throughput *= 1 / survive;
+  }
+  return true;
 }
 
 bool PathTracer::Continue(State& state,
@@ -183,15 +184,8 @@ bool PathTracer::Continue(State& state,
   }
   state.throughput *= sample.weight;
   state.eta_scale *= sample.eta * sample.eta;
-  const float weight = MaxComponent(state.throughput) * state.eta_scale;
-  if (state.depth >= settings_.rr_depth || weight < kLittleWeight) {
-    const float survive = state.depth >= settings_.rr_depth
-                              ? std::min(0.95F, weight)
-                              : std::min(1.0F, weight / kLittleWeight);
-    if (state.sampler.Next1D() >= survive) {
-      return false;
-    }
-    state.throughput *= 1 / survive;
+  if (!Survives(state)) {
+    return false;
   }
   state.delta = sample.delta;
   if (!sample.delta && sample.pdf <= kSharpPdf) {
@@ -205,6 +199,9 @@ bool PathTracer::Continue(State& state,
   state.side = LitSide(hit, wo);
   state.count_emission = true;
   state.ray = {OffsetOrigin(hit, wi), wi};
+  if (has_media_ && sample.wi.z * wo.z < 0) {
+    state.medium = MediumBeyond(hit, wi, state.medium);
+  }
   ++state.depth;
   return true;
 }

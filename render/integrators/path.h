@@ -39,11 +39,26 @@ class PathTracer {
                       const Frame& frame,
                       Vec3 wo) const;
   bool Continue(State& state, const SurfaceHit& hit, const Frame& frame, Vec3 wo) const;
+  bool Survives(State& state) const;
+  // Of the light sampled, what gets to a hit that isn't black for it.
+  Color LightArriving(State& state,
+                      const SurfaceHit& hit,
+                      const LightSample& light) const;
+
+  // What becomes of a ray in a medium before it gets to the next surface;
+  // path_media.cc.
+  enum class MediumEvent { kPassed, kScattered, kEnded };
+  MediumEvent CrossMedium(State& state, float distance) const;
+  void AddLightInMedium(State& state, Vec3 position) const;
+  Color LightThroughMedia(State& state,
+                          const ParticipatingMedium* medium,
+                          Ray ray) const;
   Color TranslucentRadiance(State& state, const SurfaceHit& hit, Vec3 to_viewer) const;
 
   const World& world_;
   const ExitanceSources& exitances_;
   IntegratorSettings settings_;
+  bool has_media_ = false;
   std::vector<float> exit_scale_;  ///< 1 / (π c(η)) a shape
 };
 

@@ -33,6 +33,7 @@ struct Document {
   std::map<std::string, std::string> defines;
   std::map<std::string, BsdfPtr> bsdfs;            ///< by id
   std::map<std::string, TexturePtr> textures;      ///< by id
+  std::map<std::string, MediumPtr> media;          ///< by id
   std::map<std::string, ShapeGroup> shape_groups;  ///< by id
   Scene scene;
 

@@ -35,6 +35,9 @@ const std::vector<std::string>& ObjectTags() {
                                                 "rfilter",
                                                 "integrator",
                                                 "subsurface",
+                                                "medium",
+                                                "phase",
+                                                "volume",
                                                 "ref",
                                                 "default"};
   return tags;
@@ -215,6 +218,12 @@ void Element::Ignore(const char* name, const std::string& why) {
   if (node) {
     document_->Note(node, fmt::format("'{}' has no effect: {}", name, why));
   }
+}
+
+std::optional<Element> Element::Named(const char* name,
+                                      std::initializer_list<const char*> tags) {
+  const pugi::xml_node node = FindValue(name, tags);
+  return node ? std::optional(Element(*document_, node)) : std::nullopt;
 }
 
 std::vector<Element> Element::Objects(const char* tag) {

@@ -41,6 +41,9 @@ class Element {
   /// Known, but without effect here: a note says why.
   void Ignore(const char* name, const std::string& why);
 
+  /// The child object of that name, of one of `tags`.
+  std::optional<Element> Named(const char* name,
+                               std::initializer_list<const char*> tags);
   /// Child objects of that tag without a name.
   std::vector<Element> Objects(const char* tag);
 

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 #include <map>
+#include <optional>
 #include <string>
 
 namespace nacre::render {
@@ -14,6 +15,19 @@ TexturePtr ReadTexture(Element element);
 /// The pixels of the element's `filename`, made linear by its `gamma`.
 Bitmap ReadPicture(Element& element);
 BsdfPtr ReadBsdf(Element element);
+MediumPtr ReadMedium(Element element);
+/// The parameter `name`: a <medium>, or a <ref> to one; null if it isn't there.
+MediumPtr ReadMediumOr(Element& element, const char* name);
+
+/// Scattering and absorption, a unit of length that the caller knows.
+struct Coefficients {
+  Color sigma_s;
+  Color sigma_a;
+  std::optional<float> eta;  ///< of a medium named by `material`
+};
+/// In one of three ways: a medium of Jensen's table (its reduced scattering, a mm), σ_s
+/// and σ_a, or σ_t and the albedo.
+Coefficients ReadCoefficients(Element& element);
 void ReadEmitter(Element element);
 void ReadShape(Element element);
 /// A shape that isn't in the scene yet; none if its type isn't known.

@@ -43,6 +43,8 @@ void ReadTopLevel(Document& document, const pugi::xml_node& node) {
   } else if (tag == "texture") {
     const TexturePtr texture = ReadTexture(Element(document, node));
     document.textures[document.RequiredAttribute(node, "id")] = texture;
+  } else if (tag == "medium") {
+    ReadMedium(Element(document, node));
   } else if (tag == "emitter") {
     ReadEmitter(Element(document, node));
   } else if (tag == "shape") {
@@ -60,6 +62,7 @@ void ReadTopLevel(Document& document, const pugi::xml_node& node) {
                                              "include",
                                              "bsdf",
                                              "texture",
+                                             "medium",
                                              "emitter",
                                              "shape",
                                              "sensor",

@@ -224,7 +224,7 @@ void ReadIntegrator(Element element) {
   const std::string type = element.type();
   settings.hide_emitters = element.Boolean("hideEmitters", false);
   element.Ignore("strictNormals", "light never crosses the true surface");
-  if (type == "path") {
+  if (type == "path" || type == "volpath" || type == "volpath_simple") {
     settings.kind = IntegratorSettings::Kind::kPath;
     settings.max_depth = element.Integer("maxDepth", -1);
     settings.rr_depth = element.Integer("rrDepth", 5);
@@ -240,7 +240,7 @@ void ReadIntegrator(Element element) {
       element.Ignore(name, "one of each a sample of the pixel");
     }
   } else {
-    UnknownPlugin(element, {"path", "direct"});
+    UnknownPlugin(element, {"path", "volpath", "volpath_simple", "direct"});
     return;
   }
   element.Finish();

@@ -167,7 +167,10 @@ std::optional<Shape> MakeShape(Element element) {
     }
     shape.translucency = ReadSubsurface(child);
   }
-  if (shape.bsdf == nullptr && !shape.radiance && !shape.translucency) {
+  shape.interior = ReadMediumOr(element, "interior");
+  shape.exterior = ReadMediumOr(element, "exterior");
+  if (shape.bsdf == nullptr && !shape.radiance && !shape.translucency &&
+      shape.interior == nullptr && shape.exterior == nullptr) {
     shape.bsdf = MakeDiffuse(MakeConstant({0.5F, 0.5F, 0.5F}));
   }
   element.Finish();

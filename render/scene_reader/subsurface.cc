@@ -1,5 +1,4 @@
 #include "factor/material.h"
-#include "render/jensen_media.h"
 #include "render/preset_path.h"
 #include "render/scene_reader/objects.h"
 #include "render/subsurface/analytic_profiles.h"
@@ -28,42 +27,13 @@ Color Reduced(Color sigma_s, double g) {
   return sigma_s * static_cast<float>(1 - g);
 }
 
-// Coefficients in one of three ways: a medium of Jensen's table, σ_s and σ_a, or σ_t
-// and the albedo.
-DipoleParameters ReadMedium(Element& element) {
+DipoleParameters ReadDipole(Element& element) {
   DipoleParameters p;
   const double g = InRange(element, "g", element.Float("g", 0), {-0.999, 0.999});
-  const bool coefficients = element.Has("sigmaS") || element.Has("sigmaA");
-  const bool albedo = element.Has("sigmaT") || element.Has("albedo");
-  const bool material = element.Has("material");
-  if (coefficients + albedo + material != 1) {
-    element.Fail(
-        "give one of: 'material'; 'sigmaS' and 'sigmaA'; 'sigmaT' and 'albedo'");
-  }
-  if (material) {
-    const std::string name = element.String("material", "");
-    const auto medium = FindJensenMedium(name);
-    if (!medium) {
-      element.FailAt("material",
-                     fmt::format("no medium '{}' in the table of Jensen et al. 2001{}",
-                                 name,
-                                 Suggestion(name, JensenMediumNames())));
-    }
-    p.sigma_s_prime_per_mm = medium->sigma_s_prime_per_mm;
-    p.sigma_a_per_mm = medium->sigma_a_per_mm;
-    p.eta = medium->eta;
-  } else if (coefficients) {
-    p.sigma_s_prime_per_mm = Reduced(element.Spectrum("sigmaS", {0, 0, 0}), g);
-    p.sigma_a_per_mm = element.Spectrum("sigmaA", {0, 0, 0});
-  } else {
-    const Color sigma_t = element.Spectrum("sigmaT", {0, 0, 0});
-    const Color a = element.Spectrum("albedo", {0, 0, 0});
-    if (MaxComponent(a) > 1) {
-      element.FailAt("albedo", "an albedo above 1");
-    }
-    p.sigma_s_prime_per_mm = Reduced(sigma_t * a, g);
-    p.sigma_a_per_mm = sigma_t * (Color{1, 1, 1} - a);
-  }
+  const Coefficients c = ReadCoefficients(element);
+  p.sigma_s_prime_per_mm = c.eta ? c.sigma_s : Reduced(c.sigma_s, g);
+  p.sigma_a_per_mm = c.sigma_a;
+  p.eta = c.eta.value_or(p.eta);
   const double inside = element.Has("intIOR")
                             ? element.RefractiveIndex("intIOR", "water")
                             : static_cast<double>(p.eta);
@@ -96,7 +66,7 @@ std::shared_ptr<const SubsurfaceModel> ReadAnalytic(Element& element,
   if (type == "normalizeddiffusion") {
     return ReadNormalizedDiffusion(element);
   }
-  const DipoleParameters p = ReadMedium(element);
+  const DipoleParameters p = ReadDipole(element);
   if (type == "dipole") {
     return MakeDipole(p);
   }
