@@ -150,28 +150,37 @@ std::string CalibrationFigures(const std::filesystem::path& path) {
   std::string body;
   for (const calibrate::Warning& warning : c.corrections.warnings) {
     body +=
-        Check(false, "<b>" + Escape(warning.name) + "</b>: " + Escape(warning.text));
+        Check(false,
+              "<strong>" + Escape(warning.name) + "</strong>: " + Escape(warning.text));
   }
-  std::vector<std::string> figures;
+  std::vector<std::string> maps;
   if (!c.diagnostics.corners_px.empty()) {
-    figures.push_back(Figure(ArrowMap(c.diagnostics.corners_px, true, "px"),
-                             "Reprojection: corners of all boards in the picture, and "
-                             "how far they are off the camera model."));
+    maps.push_back(Figure(ArrowMap(c.diagnostics.corners_px, true, "px"),
+                          "Reprojection: corners of all boards in the picture, and "
+                          "how far they are off the camera model."));
   }
   if (!c.diagnostics.spots_mm.empty()) {
-    figures.push_back(Figure(
+    maps.push_back(Figure(
         ArrowMap(c.diagnostics.spots_mm, false, "mm"),
         fmt::format("Laser: spots of the lattice on the sample plane, and how far they "
                     "are off the laser map; {} mm rms where held out.",
                     Number(c.laser_map_held_out_rms_mm))));
   }
+  std::vector<std::string> curves;
   if (!c.diagnostics.response.empty()) {
-    figures.push_back(ResponseFigure(c.diagnostics));
+    curves.push_back(ResponseFigure(c.diagnostics));
   }
   if (!c.corrections.glare.empty()) {
-    figures.push_back(GlareFigure(c.corrections.glare));
+    curves.push_back(GlareFigure(c.corrections.glare));
   }
-  return figures.empty() ? body : body + Row(figures);
+  // Two a row: alone a figure would be as wide as the page.
+  for (std::vector<std::string>* row : {&maps, &curves}) {
+    if (!row->empty()) {
+      row->resize(2);
+      body += Row(*row);
+    }
+  }
+  return body;
 }
 
 #else

@@ -40,29 +40,48 @@ void AddScalars(const Json& json, const std::string& prefix, std::vector<Fact>& 
 
 #ifdef NACRE_HAS_CALIBRATE
 
+std::string WithSigma(double value, double sigma) {
+  return Number(value, 4) + " ± " + Number(sigma, 2);
+}
+
 std::string CalibrationBody(const std::filesystem::path& path) {
   const calibrate::Calibration c = calibrate::ReadCalibration(path);
   std::string body = FactList(
       {{"Reprojection, rms", Number(c.reprojection_rms_px) + " px"},
        {"Laser map, rms", Number(c.laser_map_rms_mm) + " mm"},
        {"Laser map, largest", Number(c.laser_map_max_mm) + " mm"},
+       {"Laser map, held out", Number(c.laser_map_held_out_rms_mm) + " mm"},
        {"Focal length",
-        fmt::format(
-            "{} × {} px", Number(c.camera.fx_px, 4), Number(c.camera.fy_px, 4))},
+        fmt::format("{} × {} ± {} px",
+                    Number(c.camera.fx_px, 4),
+                    Number(c.camera.fy_px, 4),
+                    Number(c.focal_sigma_px, 2))},
+       {"Principal point",
+        fmt::format("{}, {} ± {} px",
+                    Number(c.camera.cx_px, 4),
+                    Number(c.camera.cy_px, 4),
+                    Number(c.centre_sigma_px, 2))},
        {"Distortion k<sub>1</sub>, k<sub>2</sub>",
         Number(c.camera.k1) + ", " + Number(c.camera.k2)},
-       {"Dark level", Number(c.dark.offset_counts) + " counts"},
-       {"Gain", Number(c.gain_electrons_per_count) + " e<sup>−</sup> a count"},
-       {"Read noise", Number(c.read_noise_electrons) + " e<sup>−</sup>"},
+       {"Dark level",
+        WithSigma(c.dark.offset_counts, c.dark.offset_sigma_counts) + " counts"},
+       {"Gain",
+        WithSigma(c.gain_electrons_per_count, c.gain_sigma_electrons_per_count) +
+            " e<sup>−</sup> a count"},
+       {"Read noise",
+        WithSigma(c.read_noise_electrons, c.read_noise_sigma_electrons) +
+            " e<sup>−</sup>"},
        {"Saturation", Number(c.saturation_counts, 4) + " counts"}});
   std::vector<std::vector<std::string>> rows;
   for (const calibrate::ChannelResponse& channel : c.channels) {
     rows.push_back({Escape(channel.name),
                     Number(channel.flux_scale_counts_mm2_sr_per_us, 4),
+                    "± " + Percent(channel.flux_scale_sigma),
                     "± " + Percent(channel.flux_scale_spread)});
   }
   return body + Table({"Channel",
                        "flux scale kΦ (counts mm<sup>2</sup> sr µs<sup>−1</sup>)",
+                       "uncertainty",
                        "over the reference target"},
                       rows);
 }
