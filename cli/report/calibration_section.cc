@@ -173,12 +173,8 @@ std::string CalibrationFigures(const std::filesystem::path& path) {
   if (!c.corrections.glare.empty()) {
     curves.push_back(GlareFigure(c.corrections.glare));
   }
-  // Two a row: alone a figure would be as wide as the page.
-  for (std::vector<std::string>* row : {&maps, &curves}) {
-    if (!row->empty()) {
-      row->resize(2);
-      body += Row(*row);
-    }
+  for (const std::vector<std::string>& row : {maps, curves}) {
+    body += row.empty() ? "" : Row(row);
   }
   return body;
 }
