@@ -270,8 +270,11 @@ std::size_t GroupReader::WorkingBytes() const {
   for (const auto& numbers : pictures_) {
     most_exposures = std::max(most_exposures, numbers.size());
   }
-  // A frame's file is held beside its counts while it is read.
-  return pixels * (2 * (most_exposures + 1) + 2 * sizeof(float));
+  // Counts, the file that they are read from (as a string that grew), rates and their
+  // variances, which pixels are hot, and the glare's pyramid.
+  const std::size_t bytes_a_pixel =
+      2 * most_exposures + 4 + 2 * sizeof(float) + 1 + sizeof(float);
+  return pixels * bytes_a_pixel;
 }
 
 }  // namespace nacre::reconstruct::internal

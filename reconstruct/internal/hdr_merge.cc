@@ -143,8 +143,9 @@ void SpreadSaturation(const calibrate::Blooming& blooming,
     }
   };
   std::vector<std::size_t> full;
+  const int saturation = static_cast<int>(std::ceil(saturation_counts));
   for (std::size_t k = 0; k < frame.counts.size(); ++k) {
-    if (static_cast<double>(frame.counts[k]) >= saturation_counts) {
+    if (frame.counts[k] >= saturation) {
       full.push_back(k);
     }
   }
@@ -160,14 +161,13 @@ void SpreadSaturation(const calibrate::Blooming& blooming,
   }
 }
 
-bool AnySaturated(std::span<const acquire::Frame> frames, double saturation_counts) {
+__attribute__((target_clones("avx2", "default"))) std::uint16_t MostCounts(
+    const std::vector<std::uint16_t>& pixels) {
   std::uint16_t most = 0;
-  for (const acquire::Frame& frame : frames) {
-    for (const std::uint16_t counts : frame.counts) {
-      most = most < counts ? counts : most;
-    }
+  for (const std::uint16_t counts : pixels) {
+    most = most < counts ? counts : most;
   }
-  return static_cast<double>(most) >= saturation_counts;
+  return most;
 }
 
 // A hot pixel's noise is beyond the model; what its neighbours saw stands for it.
@@ -236,20 +236,17 @@ std::vector<Bracket> MakeBrackets(std::span<const acquire::Frame> frames,
 
 }  // namespace
 
-void MergeExposures(std::span<const acquire::Frame> frames,
+void MergeExposures(std::span<acquire::Frame> frames,
                     const calibrate::Calibration& calibration,
                     RateFrame& rates) {
   Expect(!frames.empty(), "at least one exposure");
   const calibrate::Corrections& corrections = calibration.corrections;
-  std::vector<acquire::Frame> spread;
   const bool blooms =
       corrections.blooming.reach_px > 0 || corrections.blooming.side_reach_px > 0;
-  if (blooms && AnySaturated(frames, calibration.saturation_counts)) {
-    spread.assign(frames.begin(), frames.end());
-    for (acquire::Frame& frame : spread) {
+  for (acquire::Frame& frame : frames) {
+    if (blooms && MostCounts(frame.counts) >= calibration.saturation_counts) {
       SpreadSaturation(corrections.blooming, calibration.saturation_counts, frame);
     }
-    frames = spread;
   }
   const std::vector<Bracket> brackets = MakeBrackets(frames, calibration);
   const Noise noise{static_cast<float>(calibration.VarianceCounts2(1) -

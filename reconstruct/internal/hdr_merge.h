@@ -21,15 +21,17 @@ struct RateFrame {
 /// inverse variances of the noise model at the rate that all usable exposures agree on,
 /// which is the maximum-likelihood estimate [Hasinoff10]. Counts are made linear, what
 /// overflowing pixels spoil is left out, hot pixels are the mean of their neighbours.
-/// `rates` is overwritten.
-void MergeExposures(std::span<const acquire::Frame> frames,
+/// `rates` is overwritten, and so are counts that overflowing pixels spoil.
+void MergeExposures(std::span<acquire::Frame> frames,
                     const calibrate::Calibration& calibration,
                     RateFrame& rates);
 
+/// The same of frames that stay.
 inline RateFrame MergeExposures(std::span<const acquire::Frame> frames,
                                 const calibrate::Calibration& calibration) {
+  std::vector<acquire::Frame> own(frames.begin(), frames.end());
   RateFrame rates;
-  MergeExposures(frames, calibration, rates);
+  MergeExposures(own, calibration, rates);
   return rates;
 }
 
