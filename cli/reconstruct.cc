@@ -39,6 +39,7 @@ int Run(const Arguments& args, const Common& common) {
              {"frames", summary.frame_count},
              {"saturated_pixels", summary.saturated_count},
              {"invalid_values", summary.invalid_count},
+             {"below_glare_floor", summary.below_floor_count},
              {"max_crosstalk", summary.max_crosstalk},
              {"windows_overlap", summary.is_dense},
              {"tail_spread", summary.tail_spread},
