@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/options_json.h"
 #include "core/provenance.h"
+#include "factor/internal/auto_method.h"
 #include "factor/internal/bilinear_data.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reciprocal_data.h"
@@ -121,17 +122,26 @@ MakeMethod FindMethod(const std::string& name) {
       return make;
     }
   }
-  throw UsageError(fmt::format("no method '{}' to factor with; there are {}",
+  throw UsageError(fmt::format("no method '{}' to factor with; there are {} and auto",
                                name,
                                fmt::join(FactorMethods(), ", ")));
 }
 
 Factorization FactorSource(SliceSource& source,
                            const internal::Clusterer& clusterer,
-                           const FactorOptions& options,
+                           const FactorOptions& asked,
                            const ProgressFunction& progress) {
-  const MakeMethod make = FindMethod(options.method);
-  nacre::Validate(options);
+  nacre::Validate(asked);
+  if (asked.method == internal::kAutoMethod) {
+    return internal::FactorByBest(asked, [&](const FactorOptions& candidate) {
+      return FactorSource(source, clusterer, candidate, progress);
+    });
+  }
+  const MakeMethod make = FindMethod(asked.method);
+  FactorOptions options = asked;
+  if (options.terms == 0) {
+    options.terms = internal::OwnTerms(options.method);
+  }
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
   const std::int64_t working_bytes = WorkingBytes(source.header(), options);

@@ -16,7 +16,7 @@ namespace nacre::factor {
 /// verb has them.
 struct FactorOptions {
   std::string method = "log-svd";
-  int terms = 10;
+  int terms = 0;
   int clusters = 1;
   double bytes = 0;
   double error = 0;
@@ -28,6 +28,7 @@ struct FactorOptions {
   int polynomial = 3;
   int window_rank = 1;
   int taps = 3;
+  int sides = 0;
   double totals = 0.01;
   double memory_mb = 1000;
 
@@ -39,9 +40,13 @@ struct FactorOptions {
     visit("method",
           self.method,
           Range{},
-          "log-svd, svd, sqrt-svd, tucker, nmf, profiles (or gaussian), bilinear or "
-          "reciprocal");
-    visit("terms", self.terms, Range{1, 1024}, "terms S a channel (at most)");
+          "log-svd, svd, sqrt-svd, tucker, nmf, profiles (or gaussian), bilinear, "
+          "reciprocal, or auto: the best of those that win for some size");
+    visit("terms",
+          self.terms,
+          Range{0, 1024},
+          "terms S a channel (at most); 0: the method's own, which are 10, of bilinear "
+          "6, of reciprocal 4");
     visit("clusters", self.clusters, Range{1, 255}, "k-means clusters of slices");
     visit("bytes",
           self.bytes,
@@ -86,6 +91,11 @@ struct FactorOptions {
           Range{1, 4},
           "of reciprocal, where maps are looked at between two points: 1 at the points "
           "alone, 2 in the middle, 3 at the quarters, 4 at the eighths too");
+    visit("sides",
+          self.sides,
+          Range{0, 1},
+          "of reciprocal: 1 has a map for how light that enters at a point differs from "
+          "light that leaves from a cell; R_d without it is the same both ways");
     visit("totals",
           self.totals,
           Range{0, 1},
@@ -98,7 +108,7 @@ struct FactorOptions {
   }
 };
 
-/// Names that FactorOptions::method may take.
+/// Names that FactorOptions::method may take, beside "auto".
 const std::vector<std::string>& FactorMethods();
 
 /// What was done and how good it is. Errors are over the valid measurements, all

@@ -94,7 +94,7 @@ int Material::KernelCount() const {
     case Form::kBilinear:
       return terms * (terms + 1) / 2;
     case Form::kReciprocal:
-      return internal::ReciprocalKernelCount(terms, taps);
+      return internal::ReciprocalKernelCount(terms, taps) + sides;
     case Form::kTucker:
     case Form::kProfiles:
     case Form::kSum:
@@ -187,6 +187,23 @@ std::int64_t Material::StorageBytes() const {
                                    (cluster_count > 1 ? cluster.size() : 0));
 }
 
+Material WithoutSides(Material m) {
+  if (m.sides == 0) {
+    return m;
+  }
+  const auto kept = static_cast<std::size_t>(m.KernelCount() - 1) *
+                    static_cast<std::size_t>(m.KernelSize());
+  std::vector<float> h;
+  for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
+    h.insert(h.end(), m.Kernel(c, 0, 0), m.Kernel(c, 0, 0) + kept);
+  }
+  m.h = std::move(h);
+  m.f.resize(static_cast<std::size_t>(m.terms * m.MapSize()));
+  m.steps.f.resize(m.steps.empty() ? 0 : static_cast<std::size_t>(m.terms));
+  m.sides = 0;
+  return m;
+}
+
 void Validate(const Material& m, const std::string& origin) {
   Checker check(origin);
   const auto positive = [&](double value, const char* field) {
@@ -220,6 +237,9 @@ void Validate(const Material& m, const std::string& origin) {
                   "transform",
                   "only sums have another than the linear one");
   }
+  check.Require(m.sides == 0 || (m.sides == 1 && m.form == Form::kReciprocal),
+                "sides",
+                fmt::format("{}", m.sides));
   check.Require(m.order >= 0 && m.order <= 8, "order", fmt::format("{}", m.order));
   const std::int64_t maps = std::int64_t{m.MapSets()} * m.MapCount();
   const std::int64_t kernels =

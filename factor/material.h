@@ -58,7 +58,9 @@ struct Steps {
 /// quarters of the way, φ_3[f] half of that at its odd eighths, the exponent being cut
 /// at ln 3; d − shift goes around the window's edges. Bilinear, reciprocal and profiles
 /// are reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d); reciprocal is
-/// positive. Indices, units and orientation are those of reconstruct::RdHeader.
+/// positive. That of a point lit alone, which is what a dataset holds, is R_d times
+/// exp(g_c(d) (q(x_i) − q(x_o))) if the material has sides. Indices, units and
+/// orientation are those of reconstruct::RdHeader.
 struct Material {
   int points_x = 0;
   int points_y = 0;
@@ -74,6 +76,7 @@ struct Material {
   int margin = 0;  ///< shared maps go on for so many points beyond the grid
   int taps = 1;    ///< 1 to 4 (kReciprocal)
   int order = 0;   ///< P, 0 to 8 (kTucker)
+  int sides = 0;   ///< 1: map q and kernels g are there, after the others (kReciprocal)
 
   std::vector<double> a;  ///< A a channel (kLog, kReciprocal)
   std::vector<double> b;  ///< B a channel (kLog)
@@ -107,7 +110,7 @@ struct Material {
   int MapCount() const {
     return form == Form::kTucker
                ? terms + static_cast<int>(channels.size()) * (order + 1) + 1
-               : terms;
+               : terms + sides;
   }
   /// Sets of kernels: one a channel, or one for all.
   int KernelSets() const {
@@ -144,6 +147,9 @@ struct Material {
   /// Bytes of f, h, cluster map and row_scale as they are held in memory.
   std::int64_t StorageBytes() const;
 };
+
+/// A reciprocal material without its sides: R_d is the same number both ways.
+Material WithoutSides(Material material);
 
 /// Throws BadData naming `origin` and the field unless every size fits, every number is
 /// finite and in its range.

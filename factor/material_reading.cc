@@ -159,6 +159,11 @@ Material ReadAttributes(const AttributeReader& attributes) {
       throw attributes.At("order", "is " + attributes.Text("order") + ", not 0 to 8");
     }
     m.order = static_cast<int>(order);
+    const double sides = attributes.Number("sides");
+    if (!(sides == 0 || sides == 1)) {
+      throw attributes.At("sides", "is " + attributes.Text("sides") + ", not 0 or 1");
+    }
+    m.sides = static_cast<int>(sides);
   }
   m.provenance = attributes.Text("provenance");
   const Json channels = attributes.List("channels");

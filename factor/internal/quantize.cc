@@ -49,7 +49,7 @@ double Gain(const Job& job, const Material& m, std::size_t channel) {
 // How much a unit of each map of a reciprocal material matters: rms of what it changes
 // the logarithm of R_d by, weighted by R_d's size at an offset.
 std::vector<double> ReciprocalMapWeights(const Material& m) {
-  std::vector<double> squares(static_cast<std::size_t>(m.terms), 0.0);
+  std::vector<double> squares(static_cast<std::size_t>(m.MapCount()), 0.0);
   double all = 0;
   for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
     for (std::int64_t cell = 0; cell < m.KernelSize(); ++cell) {
@@ -68,6 +68,9 @@ std::vector<double> ReciprocalMapWeights(const Material& m) {
           sum += std::pow(2 * kernel(n), 2);
         }
         squares[static_cast<std::size_t>(j)] += weight * sum;
+      }
+      if (m.sides > 0) {
+        squares.back() += weight * std::pow(2 * kernel(m.KernelCount() - 1), 2);
       }
     }
   }

@@ -41,6 +41,15 @@ class WindowTaps {
   std::vector<std::vector<TapPoint>> points_;
 };
 
+constexpr double kMostSide = 1;  // of a logarithm
+
+// Of a map's value at a grid point, or at the nearest point there is.
+std::size_t IndexIn(const Material& m, GridIndex point) {
+  const int x = std::clamp(point.x + m.margin, 0, m.MapWidth() - 1);
+  const int y = std::clamp(point.y + m.margin, 0, m.MapHeight() - 1);
+  return static_cast<std::size_t>(std::int64_t{y} * m.MapWidth() + x);
+}
+
 // What kernels multiply, at the cells around a grid point.
 class Features {
  public:
@@ -49,7 +58,7 @@ class Features {
         taps_(WindowTaps::Of(m)),
         point_(point),
         here_(Maps(point)),
-        values_(static_cast<std::size_t>(m.KernelCount())) {}
+        values_(static_cast<std::size_t>(ReciprocalKernelCount(m.terms, m.taps))) {}
 
   const std::vector<double>& At(GridIndex cell) {
     const int radius = (m_.core - 1) / 2;
@@ -62,7 +71,7 @@ class Features {
       values_[1 + n] = here_[n] + there[n];
     }
     for (const TapPoint& tap : taps_.At(cell)) {
-      const std::size_t at = IndexOf({point_.x + tap.dx, point_.y + tap.dy});
+      const std::size_t at = IndexIn(m_, {point_.x + tap.dx, point_.y + tap.dy});
       const auto first = static_cast<std::size_t>(TapKernel(m_.terms, tap.tap, 0));
       for (int j = 0; j < m_.terms; ++j) {
         values_[first + static_cast<std::size_t>(j)] +=
@@ -79,15 +88,29 @@ class Features {
     return values_;
   }
 
- private:
-  std::size_t IndexOf(GridIndex point) const {
-    const int x = std::clamp(point.x + m_.margin, 0, m_.MapWidth() - 1);
-    const int y = std::clamp(point.y + m_.margin, 0, m_.MapHeight() - 1);
-    return static_cast<std::size_t>(std::int64_t{y} * m_.MapWidth() + x);
+  // What R_d is multiplied by for light that enters at the point itself.
+  double Side(int channel, GridIndex cell) const {
+    if (m_.sides == 0) {
+      return 1;
+    }
+    const int radius = (m_.core - 1) / 2;
+    const float* q = m_.FactorMap(0, m_.terms);
+    const std::size_t there =
+        IndexIn(m_, {point_.x + cell.x - radius, point_.y + cell.y - radius});
+    const std::int64_t index = std::int64_t{cell.y} * m_.core + cell.x;
+    const auto g = static_cast<double>(
+        m_.Kernel(channel,
+                  0,
+                  m_.KernelCount() - 1)[std::min(index, m_.WindowSize() - 1 - index)]);
+    return std::exp(std::clamp(g * (static_cast<double>(q[IndexIn(m_, point_)]) -
+                                    static_cast<double>(q[there])),
+                               -kMostSide,
+                               kMostSide));
   }
 
+ private:
   std::vector<double> Maps(GridIndex point) const {
-    const std::size_t at = IndexOf(point);
+    const std::size_t at = IndexIn(m_, point);
     std::vector<double> values(static_cast<std::size_t>(m_.terms));
     for (int j = 0; j < m_.terms; ++j) {
       values[static_cast<std::size_t>(j)] = static_cast<double>(m_.FactorMap(0, j)[at]);
@@ -102,10 +125,87 @@ class Features {
   std::vector<double> values_;
 };
 
-float Value(const Material& m,
-            int channel,
-            GridIndex cell,
-            const std::vector<double>& features) {
+__attribute__((target_clones("avx2", "default"))) void AddWeighted(
+    const float* kernel, const double* feature, std::size_t n, double* s) {
+  for (std::size_t i = 0; i < n; ++i) {
+    s[i] += static_cast<double>(kernel[i]) * feature[i];
+  }
+}
+
+// The same for all cells of a window at once: each number comes of the same sums in the
+// same order.
+class WindowFeatures {
+ public:
+  WindowFeatures(const Material& m, GridIndex point)
+      : m_(m),
+        size_(static_cast<std::size_t>(m.WindowSize())),
+        values_(
+            size_ * static_cast<std::size_t>(ReciprocalKernelCount(m.terms, m.taps)),
+            0.0) {
+    const int radius = (m.core - 1) / 2;
+    const std::size_t here = IndexIn(m, {point.x, point.y});
+    std::fill_n(values_.begin(), size_, 1.0);
+    std::vector<std::size_t> there(size_);
+    const WindowTaps& taps = WindowTaps::Of(m);
+    for (std::size_t n = 0; n < size_; ++n) {
+      const auto cell = static_cast<int>(n);
+      const GridIndex index{cell % m.core, cell / m.core};
+      there[n] = IndexIn(m, {point.x + index.x - radius, point.y + index.y - radius});
+      for (const TapPoint& tap : taps.At(index)) {
+        const std::size_t at = IndexIn(m, {point.x + tap.dx, point.y + tap.dy});
+        double* value = &values_[n + size_ * static_cast<std::size_t>(
+                                                 TapKernel(m.terms, tap.tap, 0))];
+        for (int j = 0; j < m.terms; ++j) {
+          value[static_cast<std::size_t>(j) * size_] +=
+              static_cast<double>(tap.weight) *
+              static_cast<double>(m.FactorMap(0, j)[at]);
+        }
+      }
+    }
+    double* pair =
+        &values_[size_ * static_cast<std::size_t>(PairKernel(m.terms, m.taps, 0, 0))];
+    for (int j = 0; j < m.terms; ++j) {
+      const float* f = m.FactorMap(0, j);
+      const auto f_here = static_cast<double>(f[here]);
+      double* ends = &values_[size_ * static_cast<std::size_t>(1 + j)];
+      for (std::size_t n = 0; n < size_; ++n) {
+        ends[n] = f_here + static_cast<double>(f[there[n]]);
+      }
+      for (int k = j; k < m.terms; ++k) {
+        const float* g = m.FactorMap(0, k);
+        const auto g_here = static_cast<double>(g[here]);
+        for (std::size_t n = 0; n < size_; ++n) {
+          *pair++ = f_here * static_cast<double>(g[there[n]]) +
+                    g_here * static_cast<double>(f[there[n]]);
+        }
+      }
+    }
+  }
+
+  void Sum(int channel, double* s) const {
+    std::fill_n(s, size_, 0.0);
+    const std::size_t half = (size_ + 1) / 2;
+    const int count = ReciprocalKernelCount(m_.terms, m_.taps);
+    std::vector<float> mirrored(half - 1);
+    for (int k = 0; k < count; ++k) {
+      const float* kernel = m_.Kernel(channel, 0, k);
+      const double* values = &values_[static_cast<std::size_t>(k) * size_];
+      std::reverse_copy(kernel, kernel + half - 1, mirrored.begin());
+      AddWeighted(kernel, values, half, s);
+      AddWeighted(mirrored.data(), values + half, half - 1, s + half);
+    }
+  }
+
+ private:
+  const Material& m_;
+  std::size_t size_;
+  std::vector<double> values_;  // [kernel][cell]
+};
+
+double Value(const Material& m,
+             int channel,
+             GridIndex cell,
+             const std::vector<double>& features) {
   const std::int64_t index = std::int64_t{cell.y} * m.core + cell.x;
   const float* kernel =
       m.Kernel(channel, 0, 0) + std::min(index, m.WindowSize() - 1 - index);
@@ -114,14 +214,15 @@ float Value(const Material& m,
     s += static_cast<double>(*kernel) * feature;
     kernel += m.KernelSize();
   }
-  return static_cast<float>(m.a[static_cast<std::size_t>(channel)] *
-                            std::exp(std::min(s, kMostLog)));
+  return m.a[static_cast<std::size_t>(channel)] * std::exp(std::min(s, kMostLog));
 }
 
 }  // namespace
 
 float ReciprocalCell(const Material& m, int channel, GridIndex point, GridIndex cell) {
-  return Value(m, channel, cell, Features(m, point).At(cell));
+  Features features(m, point);
+  return static_cast<float>(Value(m, channel, cell, features.At(cell)) *
+                            features.Side(channel, cell));
 }
 
 void ReciprocalWindows(const Material& m,
@@ -129,14 +230,17 @@ void ReciprocalWindows(const Material& m,
                        int first_channel,
                        int channels,
                        float* windows) {
-  Features features(m, point);
-  for (int v = 0; v < m.core; ++v) {
-    for (int u = 0; u < m.core; ++u) {
-      const std::vector<double>& values = features.At({u, v});
-      for (int c = 0; c < channels; ++c) {
-        windows[c * m.WindowSize() + v * m.core + u] =
-            Value(m, first_channel + c, {u, v}, values);
-      }
+  const WindowFeatures features(m, point);
+  const auto size = static_cast<std::size_t>(m.WindowSize());
+  std::vector<double> s(size);
+  Features one(m, point);
+  for (int c = first_channel; c < first_channel + channels; ++c) {
+    features.Sum(c, s.data());
+    const double scale = m.a[static_cast<std::size_t>(c)];
+    for (std::size_t n = 0; n < size; ++n) {
+      const auto cell = static_cast<int>(n);
+      *windows++ = static_cast<float>(scale * std::exp(std::min(s[n], kMostLog)) *
+                                      one.Side(c, {cell % m.core, cell / m.core}));
     }
   }
 }

@@ -7,7 +7,8 @@ namespace nacre::factor::internal {
 
 /// R'_d of a reciprocal material, without row_scale. Every sum runs over what is the
 /// same from both ends in the same order, and so R'_d(x_i, d) and R'_d(x_o, −d) are
-/// equal to the last bit. What lies beyond the maps is as their nearest point.
+/// equal to the last bit, but for the factor that sides make. What lies beyond the maps
+/// is as their nearest point.
 float ReciprocalCell(const Material& m, int channel, GridIndex point, GridIndex cell);
 
 /// The whole windows of a point in some channels, one after the other: the same values.

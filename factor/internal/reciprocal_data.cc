@@ -1,6 +1,7 @@
 #include "factor/internal/reciprocal_data.h"
 
 #include "core/parallel.h"
+#include "factor/internal/reciprocal_sides.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,8 +10,11 @@
 namespace nacre::factor::internal {
 namespace {
 
-constexpr double kTolerance = 0.01;     // of the peak, at the peak
-constexpr double kFaintest = 1e-5;      // peaks
+constexpr double kTolerance = 0.01;  // of the peak, at the peak
+constexpr double kFaintest = 1e-5;   // peaks
+constexpr double kSidesBytes =
+    12 * 4 * 4;                     // near offsets, values and weights both ways
+constexpr double kMostPairs = 2e7;  // more take minutes, and tell no more of the maps
 constexpr double kPlanesAPair = 3 * 4;  // values, weights, linearised weights: floats
 
 double PlaneSize(const reconstruct::RdHeader& header) {
@@ -25,7 +29,8 @@ std::size_t HeldCount(const reconstruct::RdHeader& header,
                       const ReciprocalLimits& limits) {
   const double a_cell =
       kPlanesAPair * PlaneSize(header) * static_cast<double>(header.channels.size());
-  const double fitting = limits.memory_bytes / a_cell;
+  const double fitting =
+      std::min(limits.memory_bytes, kMostPairs * kPlanesAPair) / a_cell;
   return static_cast<std::size_t>(
       std::clamp(fitting, 1.0, static_cast<double>(CellCount(header))));
 }
@@ -71,11 +76,16 @@ struct Sums {
 // Adds blocks of slices to the pairs of one channel and offset, both ways round.
 class PairAdder {
  public:
-  PairAdder(const Job& job, std::size_t channel, std::size_t cell, ReciprocalData& data)
+  PairAdder(const Job& job,
+            std::size_t channel,
+            std::size_t cell,
+            PairSides* sides,
+            ReciprocalData& data)
       : header_(job.source.header()),
         channel_(channel),
         cell_(cell),
         data_(data),
+        sides_(sides),
         scale_(1 / data.scale[channel]),
         floor_(NoiseFloor(job.scans[channel]) * scale_) {
     const auto found =
@@ -102,19 +112,25 @@ class PairAdder {
       const auto y = static_cast<int>(point / header_.points_x) + data_.margin;
       const std::size_t slice =
           static_cast<std::size_t>(row * header_.SliceSize()) + channel_ * window;
-      AddOne(block, slice + cell_, x, y, sums);
+      AddOne(block, slice + cell_, x, y, sides_ ? &sides_->first : nullptr, sums);
       if (mirrored != cell_) {
         AddOne(block,
                slice + mirrored,
                x - data_.OffsetX(cell_),
                y - data_.OffsetY(cell_),
+               sides_ ? &sides_->second : nullptr,
                sums);
       }
     }
   }
 
  private:
-  void AddOne(const SliceBlock& block, std::size_t from, int x, int y, Sums& sums) {
+  void AddOne(const SliceBlock& block,
+              std::size_t from,
+              int x,
+              int y,
+              Pairs* side,
+              Sums& sums) {
     if (block.valid[from] == 0) {
       return;
     }
@@ -128,6 +144,11 @@ class PairAdder {
     sums.squared_sigma += sigma * sigma;
     sums.used += 1;
     const auto at = static_cast<std::size_t>(y * data_.width + x);
+    if (side != nullptr) {
+      side->value[at] = static_cast<float>(value);
+      side->weight[at] = static_cast<float>(sigma * sigma);
+      return;
+    }
     if (value_ != nullptr) {
       Merge(value, sigma, value_[at], weight_[at]);
     }
@@ -152,6 +173,7 @@ class PairAdder {
   std::size_t channel_;
   std::size_t cell_;
   ReciprocalData& data_;
+  PairSides* sides_;  // where both measurements of a pair go instead
   double scale_;
   double floor_;
   float* value_ = nullptr;
@@ -182,7 +204,8 @@ double ReciprocalBytes(const reconstruct::RdHeader& header,
   const auto cells = static_cast<double>(CellCount(header));
   const double sample =
       held < cells ? cells * channels * 8 * (limits.sample_pairs + 1) : 0;
-  return kPlanesAPair * PlaneSize(header) * channels * held + sample;
+  const double sides = limits.sides ? kSidesBytes * PlaneSize(header) * channels : 0;
+  return kPlanesAPair * PlaneSize(header) * channels * held + sample + sides;
 }
 
 ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
@@ -208,6 +231,8 @@ ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
     const std::size_t size = data.channels * data.cells * data.sample_size;
     data.sample = {std::vector<float>(size, 0.0F), std::vector<float>(size, -1.0F)};
   }
+  const std::vector<int> near = limits.sides ? NearCells(data) : std::vector<int>{};
+  std::vector<PairSides> sides(near.size() * data.channels, PairSides(data.Plane()));
   std::vector<Sums> sums(data.channels * data.cells);
   const std::int64_t points = header.PointCount();
   for (std::int64_t first = 0; first < points; first += kBlockRows) {
@@ -216,10 +241,22 @@ ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
         job.source.Read(first, std::min(kBlockRows, points - first));
     ParallelFor(std::ssize(sums), job.options.thread_count, [&](std::int64_t n) {
       const auto at = static_cast<std::size_t>(n);
-      PairAdder(job, at / data.cells, at % data.cells, data).Add(block, sums[at]);
+      const std::size_t channel = at / data.cells;
+      const std::size_t cell = at % data.cells;
+      const auto found = std::find(near.begin(), near.end(), static_cast<int>(cell));
+      PairSides* both = nullptr;
+      if (found != near.end()) {
+        both = &sides[channel * near.size() +
+                      static_cast<std::size_t>(found - near.begin())];
+      }
+      PairAdder(job, channel, cell, both, data).Add(block, sums[at]);
     });
   }
   ++job.passes;
+  if (limits.sides) {
+    FitSides(sides, job.options.thread_count, data);
+    MergeSides(sides, data);
+  }
   for (std::size_t n = 0; n < sums.size(); ++n) {
     const std::size_t c = n / data.cells;
     const Sums& sum = sums[n];

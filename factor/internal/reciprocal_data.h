@@ -29,18 +29,20 @@ struct ReciprocalData {
   int margin = 0;
   int core = 0;
   std::size_t channels = 0;
-  std::size_t cells = 0;        ///< (core² + 1) / 2
-  std::vector<double> scale;    ///< a channel: its peak, mm⁻²
-  std::vector<double> mean;     ///< [channel][cell], in peaks
-  std::vector<double> noise;    ///< [channel][cell]: rms of sigma, in peaks
-  std::vector<int> held;        ///< cells
-  std::vector<float> share;     ///< [held]: offsets that it stands for
-  Pairs pairs;                  ///< [channel][held][y][x]
-  std::size_t stride = 1;       ///< the sample is pairs n · stride + cell % stride
-  std::size_t sample_size = 0;  ///< of a channel and cell
-  Pairs sample;                 ///< [channel][cell][n]; empty if all are held
-  double tail_weight = 1;       ///< q of Tolerance
-  bool has_weights = false;     ///< what `weight` of pairs is
+  std::size_t cells = 0;           ///< (core² + 1) / 2
+  std::vector<double> scale;       ///< a channel: its peak, mm⁻²
+  std::vector<double> mean;        ///< [channel][cell], in peaks
+  std::vector<double> noise;       ///< [channel][cell]: rms of sigma, in peaks
+  std::vector<int> held;           ///< cells
+  std::vector<float> share;        ///< [held]: offsets that it stands for
+  Pairs pairs;                     ///< [channel][held][y][x]
+  std::size_t stride = 1;          ///< the sample is pairs n · stride + cell % stride
+  std::size_t sample_size = 0;     ///< of a channel and cell
+  Pairs sample;                    ///< [channel][cell][n]; empty if all are held
+  double tail_weight = 1;          ///< q of Tolerance
+  SharedMaps sides;                ///< q of FitSides, or empty
+  std::vector<double> sides_near;  ///< g: a channel's NearCells, one after the other
+  bool has_weights = false;        ///< what `weight` of pairs is
 
   std::size_t Plane() const {
     return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
@@ -88,6 +90,7 @@ struct ReciprocalLimits {
   int sample_pairs = 3000;  ///< wanted of an offset
   double memory_bytes = 1e9;
   double tail_weight = 1;
+  bool sides = false;  ///< whether to look for them
 };
 
 ReciprocalLimits LimitsOf(const FactorOptions& options);

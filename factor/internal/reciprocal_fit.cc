@@ -12,9 +12,12 @@
 namespace nacre::factor::internal {
 namespace {
 
-constexpr int kMostRounds = 12;
-constexpr double kLeastStep = 0.2;  // as a share of the whole
-constexpr double kEnough = 0.01;    // a round that gains less is the last
+constexpr int kMostRounds = 16;
+constexpr double kLeastStep = 0.2;   // as a share of the whole
+constexpr double kMostStep = 4;      // the same
+constexpr double kLonger = 1.5;      // steps that are worth another trial
+constexpr double kEnough = 0.004;    // two rounds that gain less are the last
+constexpr double kLeastSlope = 0.1;  // of the map step's own
 
 // The pair kernels of a channel and cell as a matrix: f(x_i)ᵀ P f(x_o).
 Eigen::MatrixXd PairMatrix(const ReciprocalFit& fit, Eigen::Index column) {
@@ -59,9 +62,17 @@ void ChangeMaps(const Eigen::MatrixXd& a,
   fit.f = g;
 }
 
+// Maps times a triangular matrix's inverse.
+SharedMaps Unmixed(const Eigen::MatrixXd& root, const SharedMaps& maps) {
+  return root.triangularView<Eigen::Lower>()
+      .solve(maps.cast<double>().eval())
+      .cast<float>();
+}
+
 // Mean 0, mean products the identity over the grid. A ridge keeps maps that depend on
-// each other from blowing up.
-void Whiten(const ReciprocalData& data, ReciprocalFit& fit) {
+// each other from blowing up. Returns what the maps, their mean taken off, were
+// multiplied by the inverse of.
+Eigen::MatrixXd Whiten(const ReciprocalData& data, ReciprocalFit& fit) {
   const Eigen::Index terms = fit.f.rows();
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(terms);
   Eigen::MatrixXd products = Eigen::MatrixXd::Zero(terms, terms);
@@ -82,6 +93,7 @@ void Whiten(const ReciprocalData& data, ReciprocalFit& fit) {
                                .solve((fit.f.cast<double>().colwise() - mean).eval())
                                .cast<float>();
   ChangeMaps(root, mean, white, fit);
+  return root;
 }
 
 // Turns the maps so that each contributes as much as possible after those before it.
@@ -115,6 +127,96 @@ void MakeCanonical(const ReciprocalData& data, ReciprocalFit& fit) {
              fit);
 }
 
+// Nonlinear conjugate gradients on the error as a function of the maps alone, kernels
+// being what fits them best; the Gauss–Newton step of the maps is the preconditioned
+// gradient [DeSterck15, with the β of Polak and Ribière]. Alternating steps by
+// themselves crawl along valleys where maps and kernels have to change together.
+class MapDescent {
+ public:
+  MapDescent(const ReciprocalData& data, int thread_count, double error)
+      : data_(data), thread_count_(thread_count), error_(error) {}
+
+  double error() const { return error_; }
+
+  // False if no step lowers the error.
+  bool Round(ReciprocalFit& fit) {
+    ++fit.rounds;
+    const MapChange now = MapStep(data_, fit, thread_count_);
+    const double own_slope = Dot(now.pull, now.step);
+    SharedMaps along = now.step;
+    double slope = own_slope;
+    if (last_slope_ > 0) {
+      const double beta =
+          std::max(0.0, (own_slope - Dot(now.pull, last_step_)) / last_slope_);
+      along += static_cast<float>(beta) * last_along_;
+      slope = Dot(now.pull, along);
+    }
+    const bool is_plain = !(last_slope_ > 0) || !(slope > kLeastSlope * own_slope);
+    if (is_plain) {
+      along = now.step;
+      slope = own_slope;
+    }
+    Trial best = Search(fit, along, slope);
+    if (!(best.error < error_)) {
+      last_slope_ = 0;
+      return !is_plain;  // the plain step is still to be tried
+    }
+    error_ = best.error;
+    fit = std::move(best.fit);
+    last_slope_ = own_slope;
+    last_step_ = Unmixed(best.root, now.step);
+    last_along_ = Unmixed(best.root, static_cast<float>(best.length) * along);
+    return true;
+  }
+
+ private:
+  struct Trial {
+    ReciprocalFit fit;
+    Eigen::MatrixXd root;
+    double length = 0;
+    double error = 0;
+  };
+
+  Trial Try(const ReciprocalFit& fit, const SharedMaps& along, double length) const {
+    Trial trial{fit, {}, length, 0};
+    trial.fit.f += static_cast<float>(length) * along;
+    trial.root = Whiten(data_, trial.fit);
+    trial.error = SolveReciprocalKernels(
+        data_, KernelStart::kGoOn, false, thread_count_, trial.fit);
+    return trial;
+  }
+
+  // The whole step; if it is no good, halves of it; if a parabola says that a longer
+  // one is better, that.
+  Trial Search(const ReciprocalFit& fit, const SharedMaps& along, double slope) const {
+    Trial best = Try(fit, along, 1);
+    if (best.error < error_) {
+      const double curvature = best.error - error_ + 2 * slope;
+      const double length =
+          curvature > slope / kMostStep ? slope / curvature : kMostStep;
+      if (length > kLonger) {
+        Trial longer = Try(fit, along, length);
+        if (longer.error < best.error) {
+          return longer;
+        }
+      }
+      return best;
+    }
+    for (double length = 0.5; length > kLeastStep && !(best.error < error_);
+         length /= 2) {
+      best = Try(fit, along, length);
+    }
+    return best;
+  }
+
+  const ReciprocalData& data_;
+  int thread_count_;
+  double error_;
+  double last_slope_ = 0;  // 0: no direction to go on in
+  SharedMaps last_step_;
+  SharedMaps last_along_;
+};
+
 }  // namespace
 
 ReciprocalFit FitReciprocal(ReciprocalData& data,
@@ -132,30 +234,14 @@ ReciprocalFit FitReciprocal(ReciprocalData& data,
     data.has_weights = true;
     least = SolveReciprocalKernels(data, KernelStart::kGoOn, false, thread_count, fit);
   }
-  double gained = 1;
-  while (fit.rounds < kMostRounds && gained > kEnough) {
+  MapDescent descent(data, thread_count, least);
+  for (int small = 0; fit.rounds < kMostRounds && small < 2;) {
     Report(progress, {"factor", fit.rounds, kMostRounds, "alternating"});
-    const SharedMaps step = MapStep(data, fit, thread_count);
-    ReciprocalFit next;
-    double error = least;
-    for (float length = 1; length > static_cast<float>(kLeastStep); length /= 2) {
-      next = fit;
-      next.f += length * step;
-      Whiten(data, next);
-      error =
-          SolveReciprocalKernels(data, KernelStart::kGoOn, false, thread_count, next);
-      if (error < least) {
-        break;
-      }
-    }
-    ++fit.rounds;
-    if (!(error < least)) {
+    const double before = descent.error();
+    if (!descent.Round(fit)) {
       break;
     }
-    gained = 1 - error / least;
-    least = error;
-    next.rounds = fit.rounds;
-    fit = std::move(next);
+    small = descent.error() > (1 - kEnough) * before ? small + 1 : 0;
   }
   MakeCanonical(data, fit);
   SolveReciprocalKernels(data, KernelStart::kLogarithms, true, thread_count, fit);

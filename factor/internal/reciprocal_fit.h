@@ -38,14 +38,18 @@ void SetSampleWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData
 /// The Gauss–Newton step of all maps at once, given the kernels: conjugate gradients on
 /// the normal equations, preconditioned by each point's own block. Standard deviations
 /// of 1 are known of the maps beforehand, which holds points that little was measured
-/// of.
-SharedMaps MapStep(const ReciprocalData& data,
-                   const ReciprocalFit& fit,
-                   int thread_count);
+/// of. `pull` is half of what the error falls by along a change of the maps.
+struct MapChange {
+  SharedMaps step;
+  SharedMaps pull;
+};
+MapChange MapStep(const ReciprocalData& data,
+                  const ReciprocalFit& fit,
+                  int thread_count);
 
-/// Alternates MapStep and SolveReciprocalKernels until it gains little. A step that
-/// doesn't lower the error is taken back by halves. Maps end turned so that each
-/// contributes as much as possible after those before it, signs canonical.
+/// Follows MapStep, each time with kernels that fit the maps, until it gains little. No
+/// round raises the error. Maps end turned so that each contributes as much as possible
+/// after those before it, signs canonical.
 ReciprocalFit FitReciprocal(ReciprocalData& data,
                             const SharedMaps& start,
                             int taps,

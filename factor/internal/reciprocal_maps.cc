@@ -16,10 +16,12 @@ namespace {
 // Offsets are dealt to this many sums, which are added in their order: the bits don't
 // depend on the number of threads.
 constexpr std::size_t kGroups = 8;
-constexpr int kMostSteps = 10;    // of conjugate gradients
+constexpr int kMostSteps = 8;     // of conjugate gradients
 constexpr double kEnough = 1e-3;  // of the squared residual, preconditioned
 constexpr float kMostChange = 2;  // of a logarithm
-constexpr double kPrior = 1;      // inverse variance of a map's value
+// Inverse variance of a map's value. Weights take 1 % for noise (kTolerance), some ten
+// times what it is: this is what a variance of 1 means in their units.
+constexpr double kPrior = 0.01;
 
 using RowWork = std::function<void(
     ReciprocalRows& rows, std::size_t pairs, float share, SharedMaps& sum)>;
@@ -160,20 +162,11 @@ class Preconditioner {
   SharedMaps blocks_;
 };
 
-// In the order of points: the same for any number of threads.
-double Dot(const SharedMaps& a, const SharedMaps& b) {
-  double sum = 0;
-  for (Eigen::Index n = 0; n < a.size(); ++n) {
-    sum += static_cast<double>(a.data()[n]) * static_cast<double>(b.data()[n]);
-  }
-  return sum;
-}
-
 }  // namespace
 
-SharedMaps MapStep(const ReciprocalData& data,
-                   const ReciprocalFit& fit,
-                   int thread_count) {
+MapChange MapStep(const ReciprocalData& data,
+                  const ReciprocalFit& fit,
+                  int thread_count) {
   const Linearized linear = Linearize(data, fit, thread_count);
   const Preconditioner preconditioner(data, fit, linear.weight, thread_count);
   const auto normal = [&](const SharedMaps& change) -> SharedMaps {
@@ -192,7 +185,8 @@ SharedMaps MapStep(const ReciprocalData& data,
                     });
   };
   SharedMaps step = SharedMaps::Zero(fit.f.rows(), fit.f.cols());
-  SharedMaps r = linear.pull - static_cast<float>(kPrior) * fit.f;
+  const SharedMaps pull = linear.pull - static_cast<float>(kPrior) * fit.f;
+  SharedMaps r = pull;
   SharedMaps z = preconditioner.Apply(r);
   SharedMaps p = z;
   double rz = Dot(r, z);
@@ -211,7 +205,7 @@ SharedMaps MapStep(const ReciprocalData& data,
     p = z + static_cast<float>(next / rz) * p;
     rz = next;
   }
-  return step;
+  return {step, pull};
 }
 
 void SetHeldWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData& data) {

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reciprocal_fit.h"
+#include "factor/internal/reciprocal_sides.h"
 #include "factor/internal/reciprocal_taps.h"
 
 #include <algorithm>
@@ -35,7 +36,7 @@ class ReciprocalMethod final : public Method {
     m.f.assign(fit.f.data(), fit.f.data() + fit.f.size());
     const auto size = static_cast<std::size_t>(m.KernelSize());
     for (std::size_t c = 0; c < data_.channels; ++c) {
-      for (int k = 0; k < m.KernelCount(); ++k) {
+      for (int k = 0; k < ReciprocalKernelCount(m.terms, m.taps); ++k) {
         for (std::size_t cell = 0; cell < size; ++cell) {
           const auto window = static_cast<std::size_t>(m.WindowSize());
           const std::size_t n = std::min(cell, window - 1 - cell);
@@ -44,14 +45,21 @@ class ReciprocalMethod final : public Method {
         }
       }
     }
+    AddSides(job_, data_, m);
     return m;
   }
 
   void Describe(FactorSummary& summary) const override {
     summary.a = data_.scale;
+    if (job_.options.sides > 0 && data_.sides.size() == 0) {
+      summary.notes.push_back(
+          "the two directions of near pairs don't differ by a map's values: no side "
+          "map (option sides)");
+    }
     if (!data_.HoldsAll()) {
       summary.notes.push_back(fmt::format(
-          "maps are fitted to {} of {} offsets, as memory allows (option memory_mb)",
+          "maps are fitted to {} of {} offsets, as memory allows (option memory_mb), "
+          "and to 20 million pairs at most",
           data_.held.size(),
           data_.cells));
     }
@@ -70,7 +78,8 @@ ReciprocalLimits LimitsOf(const FactorOptions& options) {
   return {.terms = options.terms,
           .sample_pairs = std::clamp(24 * kernels, 3000, 20000),
           .memory_bytes = options.memory_mb * 1e6,
-          .tail_weight = options.tail_weight};
+          .tail_weight = options.tail_weight,
+          .sides = options.sides > 0};
 }
 
 std::unique_ptr<Method> MakeReciprocalMethod(Job& job) {

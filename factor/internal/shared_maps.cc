@@ -14,6 +14,14 @@ void ExtendMaps(int width, int height, int margin, SharedMaps& maps) {
   }
 }
 
+double Dot(const SharedMaps& a, const SharedMaps& b) {
+  double sum = 0;
+  for (Eigen::Index n = 0; n < a.size(); ++n) {
+    sum += static_cast<double>(a.data()[n]) * static_cast<double>(b.data()[n]);
+  }
+  return sum;
+}
+
 __attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
     float* __restrict to, const float* __restrict a, float b, std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {

@@ -15,6 +15,9 @@ using SharedMaps =
 /// `height` count the margins.
 void ExtendMaps(int width, int height, int margin, SharedMaps& maps);
 
+/// Σ a · b, added up in the order of points.
+double Dot(const SharedMaps& a, const SharedMaps& b);
+
 /// to += a · b for n values.
 void AddScaled(float* __restrict to, const float* __restrict a, float b, std::size_t n);
 

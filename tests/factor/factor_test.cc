@@ -251,12 +251,34 @@ TEST(Factor, UnknownMethodIsAUsageErrorThatListsTheOthers) {
 TEST(Factor, OptionsOutOfRangeAreNamed) {
   const RdDataset dataset = nacre::testing::MakeConstant(2, 2, 3, 1);
   try {
-    Factor(dataset, {.terms = 0});
+    Factor(dataset, {.terms = -1});
     FAIL();
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kUsage);
     EXPECT_THAT(e.what(), HasSubstr("terms"));
   }
+}
+
+// Against each candidate by itself.
+TEST(Factor, AutoTakesWhatIsBestAndSaysSo) {
+  const RdDataset dataset = MakeChessboard({.points_x = 12, .points_y = 12, .core = 5});
+  const FactorSummary reciprocal =
+      Factor(dataset, {.method = "reciprocal", .sides = 1}).summary;
+  const FactorSummary bilinear = Factor(dataset, {.method = "bilinear"}).summary;
+  const FactorSummary log_svd = Factor(dataset, {.method = "log-svd"}).summary;
+  EXPECT_EQ(reciprocal.terms, 4);
+  EXPECT_EQ(bilinear.terms, 6);
+  EXPECT_EQ(log_svd.terms, 10);
+  const auto least =
+      static_cast<double>(std::min({reciprocal.bytes, bilinear.bytes, log_svd.bytes}));
+  const Factorization small = Factor(dataset, {.method = "auto", .bytes = least});
+  EXPECT_LE(static_cast<double>(small.summary.bytes), least);
+  const Factorization best = Factor(dataset, {.method = "auto"});
+  for (const FactorSummary& s : {reciprocal, bilinear, log_svd}) {
+    EXPECT_LE(best.summary.relative_l2 * best.summary.log_rms,
+              1.000001 * s.relative_l2 * s.log_rms);
+  }
+  EXPECT_THAT(best.summary.notes.back(), HasSubstr(best.material.method));
 }
 
 TEST(Factor, StopsWhenAsked) {
