@@ -58,7 +58,8 @@ void CheckSameRig(const acquire::SessionReader& session,
   }
   if (calibration.corrections.filters.mosaic != manifest.camera.mosaic) {
     throw BadData(fmt::format(
-        "{}: its pictures' colours are '{}', those of the calibration's '{}'; calibrate "
+        "{}: its pictures' colours are '{}', those of the calibration's '{}'; "
+        "calibrate "
         "this session (pictures of three counts a pixel can't be: capture in a Bayer "
         "or monochrome pixel format)",
         session.folder().string(),
@@ -195,12 +196,18 @@ void Measure(const GroupReader& reader,
   }
 }
 
+// What is done to a slice once its spots are apart.
+struct Finishing {
+  const calibrate::Calibration& calibration;
+  const internal::GlossRemover& gloss;
+  double longest_us;
+};
+
 // Pass 2: slices, freed of each other's light, in the order of the file.
-void WriteSlices(const calibrate::Calibration& calibration,
+void WriteSlices(const Finishing& finishing,
                  const ReconstructOptions& options,
                  const RdHeader& header,
                  const Separation& separation,
-                 const internal::Gloss& gloss,
                  RdWriter& writer,
                  ReconstructSummary& summary,
                  const ProgressFunction& progress) {
@@ -223,12 +230,13 @@ void WriteSlices(const calibrate::Calibration& calibration,
         if (options.symmetrize) {
           changes[k] = internal::Symmetrize(header, separation, s, slices[k]);
         }
-        internal::RemoveGloss(header, calibration, gloss, s, slices[k]);
+        finishing.gloss.Remove(s, slices[k]);
         if (options.specular_radius_cells >= 0) {
           internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
         }
         if (options.state_systematics) {
-          internal::AddSystematics(header, calibration, slices[k]);
+          internal::AddSystematics(
+              header, finishing.calibration, finishing.longest_us, slices[k]);
         }
         below[k] = internal::MarkBelowFloor(header, separation.Floor(s), slices[k]);
       });
@@ -245,24 +253,6 @@ void WriteSlices(const calibrate::Calibration& calibration,
   summary.symmetrize_change = change.Share();
   summary.symmetrize_worst_total = change.worst_total;
   Report(progress, {"reconstruct", header.points_y, header.points_y, "slices"});
-}
-
-// The mean of the channels': one set of weights serves all.
-calibrate::SpotProfile SpotOf(const acquire::SessionReader& session,
-                              const calibrate::Calibration& calibration) {
-  const auto& spots = calibration.corrections.spots;
-  calibrate::SpotProfile mean;
-  if (spots.empty()) {
-    const double sigma_mm = internal::MeasureSpotSigmaMm(session, calibration);
-    mean.xx_mm2 = mean.yy_mm2 = sigma_mm * sigma_mm;
-  }
-  for (const calibrate::SpotProfile& spot : spots) {
-    const auto count = static_cast<double>(spots.size());
-    mean.xx_mm2 += spot.xx_mm2 / count;
-    mean.xy_mm2 += spot.xy_mm2 / count;
-    mean.yy_mm2 += spot.yy_mm2 / count;
-  }
-  return mean;
 }
 
 // In some groups, evenly over those that were captured.
@@ -309,8 +299,9 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   calibration.camera = of_rig.camera.OnPlane(state.plane);
   const RdHeader header = HeaderOf(session, calibration, options);
   ReconstructSummary summary;
-  const calibrate::SpotProfile spot =
-      options.sharpen_spot ? SpotOf(session, of_rig) : calibrate::SpotProfile{};
+  const calibrate::SpotProfile spot = options.sharpen_spot
+                                          ? internal::SpotOf(session, of_rig)
+                                          : calibrate::SpotProfile{};
   summary.spot_sigma_mm = std::sqrt(std::max(0.0, 0.5 * (spot.xx_mm2 + spot.yy_mm2)));
   summary.group_count = session.schedule().group_count();
   summary.slice_count = header.PointCount();
@@ -346,8 +337,21 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   if (std::string text = gloss.Warning(header.channels); !text.empty()) {
     summary.warnings.push_back(std::move(text));
   }
-  WriteSlices(
-      calibration, options, header, separation, gloss, writer, summary, progress);
+  const internal::GlossRemover remover(
+      gloss, calibration, state.plane, header, reader.weights());
+  const auto& exposures_us = session.rig().camera.exposures_us;
+  const Finishing finishing{
+      calibration,
+      remover,
+      *std::max_element(exposures_us.begin(), exposures_us.end())};
+  WriteSlices(finishing, options, header, separation, writer, summary, progress);
+  if (summary.below_floor_count > 0) {
+    summary.warnings.push_back(
+        fmt::format("glare-floor: {} of {} values are below what glare leaves uncertain "
+                    "and are marked as not valid",
+                    summary.below_floor_count,
+                    header.PointCount() * header.SliceSize()));
+  }
   writer.Finish();
   RdReader written(out);
   summary.reciprocity = MeasureReciprocity(written);

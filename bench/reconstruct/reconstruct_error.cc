@@ -1,27 +1,32 @@
 // Errors of the reconstruction against the truth, in units of what photons allow:
 //
-//   reconstruct_error RIG.toml [--seed N] [--spacing CELLS] [--keep FOLDER]
-//   [--no-crosstalk]
+//   reconstruct_error RIG.toml [--seed N] [--phantom NAME] [--spacing CELLS]
+//   [--set KEY=VALUE]… [--keep FOLDER] [--values FOLDER] [--no-crosstalk]
+//   [--at-grid]
 //
 // captures the rig's session with each of three phantoms (chessboard, marble with
 // veins, skin that is nearly homogeneous) in place of its own, calibrates, reconstructs
-// and compares with the fast solver that the rig was lit with. --keep keeps sessions
-// and takes those that are there. For each phantom, by decades of R_d relative to the
-// largest:
-//   rms of error / Cramér–Rao bound    of the photons collected in the cell by the
-//                                      exposures in which its pixels don't saturate
+// and compares with the fast solver that the rig was lit with. --set changes a key of
+// the rig file, --keep keeps sessions and takes those that are there, --values writes
+// each value as float32 (Value, below). For each phantom, by decades of R_d relative to
+// the largest, the truth being R_d at the points that the beams really lit (with
+// --at-grid: at the grid points that they were aimed at):
+//   rms of error / Cramér–Rao bound    of the photons collected by the exposures in
+//                                      which pixels don't saturate, for R_d of a pencil
+//                                      of light: without bias that takes the inverse of
+//                                      the known blur by spot and lens
+//   rms of error / the same with the sensor's own noise
+//   rms of error / noise of the cell's photons, as if there were no blur
 //   rms of error / stated sigma, and the share of errors within 1 sigma
 // and of the totals of slices the bias, mean and worst.
 
-#include "acquire/capture.h"
 #include "calibrate/calibrate.h"
-#include "core/atomic_file.h"
+#include "calibrate/glare.h"
 #include "core/parallel.h"
-#include "reconstruct/error_figures.h"
 #include "reconstruct/internal/cell_weights.h"
 #include "reconstruct/internal/hdr_merge.h"
+#include "reconstruct/internal/spot_width.h"
 #include "reconstruct/reconstruct.h"
-#include "rigs/simulated_rig.h"
 #include "rigs/transport/transport.h"
 
 #include <array>
@@ -29,8 +34,8 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
-#include <fmt/format.h>
-#include <regex>
+
+#include "error_sessions.h"
 
 namespace nacre::reconstruct {
 namespace {
@@ -45,196 +50,167 @@ double Seconds() {
 }
 
 struct Arguments {
-  std::filesystem::path rig;
-  std::filesystem::path folder;
-  std::string seed = "4711";
-  std::string spacing;
+  bench::ErrorSession session;
+  std::vector<std::string> phantoms = bench::ErrorPhantoms();
+  std::filesystem::path values;
+  bool at_grid = false;
   ReconstructOptions options;
 };
 
-struct Sample {
-  const char* name;
-  const char* media;
+// What --values writes.
+struct Value {
+  float channel, i, j, u, v;
+  float truth, rd, sigma;
+  float bound;         // of the photons
+  float sensor_bound;  // and of the sensor
+  float plain;         // of the cell's photons, without blur
+  float glare;         // of what is seen there
 };
 
-// Grid and channels come from the rig.
-constexpr std::array<Sample, 3> kSamples = {{{"chessboard", R"([[medium]]
-sigma_a_per_mm = [0.0021, 0.0041, 0.0071]
-sigma_s_per_mm = [2.19, 2.62, 3.00]
-[[medium]]
-sigma_a_per_mm = [0.060, 0.030, 0.045]
-sigma_s_per_mm = [1.00, 1.10, 1.05]
-[pattern]
-type = "chessboard"
-cell_mm = 8.3
-)"},
-                                             {"marble", R"([[medium]]
-sigma_a_per_mm = [0.0021, 0.0041, 0.0071]
-sigma_s_per_mm = [2.19, 2.62, 3.00]
-[[medium]]
-sigma_a_per_mm = [0.12, 0.10, 0.09]
-sigma_s_per_mm = [2.6, 2.8, 3.0]
-[pattern]
-type = "veins"
-solid = false
-seed = 9
-scale_mm = 16.0
-width_mm = 2.5
-direction_deg = 20
-voxel_mm = 0.5
-)"},
-                                             {"skin", R"([[medium]]
-sigma_a_per_mm = [0.032, 0.17, 0.48]
-sigma_s_per_mm = [0.74, 0.88, 1.01]
-[[medium]]
-sigma_a_per_mm = [0.034, 0.18, 0.50]
-sigma_s_per_mm = [0.76, 0.90, 1.03]
-[pattern]
-type = "veins"
-solid = false
-seed = 5
-scale_mm = 12.0
-width_mm = 3.0
-voxel_mm = 0.5
-)"}}};
-
-std::string Replace(const std::string& text,
-                    const char* key,
-                    const std::string& value) {
-  return std::regex_replace(text,
-                            std::regex(fmt::format("(^|\n){} = [^\n]*", key)),
-                            fmt::format("$1{} = {}", key, value));
-}
-
-std::filesystem::path Capture(const Arguments& args, const Sample& sample) {
-  const std::filesystem::path folder =
-      args.folder / fmt::format("{}-{}-{}-{}",
-                                args.rig.stem().string(),
-                                sample.name,
-                                args.seed,
-                                args.spacing.empty() ? "as-is" : args.spacing);
-  std::filesystem::create_directories(folder);
-  const acquire::RigDescription base = acquire::ReadRig(args.rig);
-  WriteFile(
-      folder / "phantom.toml",
-      fmt::format("[slab]\nthickness_mm = 10.0\neta = {}\n{}[beam]\nshape = "
-                  "\"pencil\"\n[grid]\npoints = [{}, {}]\npitch_mm = {}\ncore = {}\n",
-                  base.sample.eta,
-                  sample.media,
-                  base.grid.points_x,
-                  base.grid.points_y,
-                  base.grid.pitch_mm,
-                  base.grid.core));
-  std::string rig = Replace(base.text, "phantom", "\"phantom.toml\"");
-  if (!args.spacing.empty()) {
-    rig = Replace(rig, "spot_spacing_cells", args.spacing);
-  }
-  WriteFile(folder / "rig.toml", Replace(rig, "seed", args.seed));
-  if (std::filesystem::exists(folder / "session" / "session.json") &&
-      acquire::SessionReader(folder / "session").IsComplete()) {
-    return folder;
-  }
-  rigs::SimulatedRig twin(folder / "rig.toml");
-  const acquire::Devices devices{twin.camera(), twin.illuminator(), twin.stage()};
-  auto writer = acquire::SessionWriter::Create(
-      folder / "session",
-      acquire::MakeManifest(
-          twin.description(), devices.camera.Info(), devices.illuminator.Info()),
-      false);
-  acquire::CaptureCalibration(writer, devices);
-  acquire::CaptureGrid(
-      writer,
-      devices,
-      calibrate::EstimateScanMap(acquire::SessionReader(folder / "session"), {}));
-  return folder;
-}
-
-// Variances of the photons alone: of a rate r seen for as long as it doesn't saturate,
-// r / (gain T).
-void KeepPhotonNoise(const acquire::SessionReader& session,
-                     const calibrate::Calibration& calibration,
-                     RateFrame& frame) {
+// Variances of a rate r that is seen for as long as it doesn't saturate: of the photons
+// alone, r / (gain T), or of the calibrated sensor.
+RateFrame WithNoise(const acquire::SessionReader& session,
+                    const calibrate::Calibration& calibration,
+                    bool photons_alone,
+                    RateFrame frame) {
   const double room = calibration.saturation_counts - calibration.dark.Counts(0);
   for (std::size_t k = 0; k < frame.rate.size(); ++k) {
     const double rate = std::max(0.0, static_cast<double>(frame.rate[k]));
-    double time_us = 0;
-    double shortest_us = 1e30;
+    double information = 0;
     for (const double exposure_us : session.rig().camera.exposures_us) {
       const double signal = rate * exposure_us;
-      shortest_us = std::min(shortest_us, exposure_us);
-      time_us += signal + 4 * std::sqrt(calibration.VarianceCounts2(signal)) < room
-                     ? exposure_us
-                     : 0;
+      const bool is_shortest = exposure_us == session.rig().camera.exposures_us.back();
+      const double all = calibration.VarianceCounts2(signal);
+      const double variance =
+          photons_alone ? all - calibration.VarianceCounts2(0) : all;
+      if (is_shortest || signal + 4 * std::sqrt(all) < room) {
+        information += exposure_us * exposure_us / std::max(variance, 1e-12);
+      }
     }
-    frame.variance[k] = static_cast<float>(
-        rate / (calibration.gain_electrons_per_count * std::max(time_us, shortest_us)));
+    frame.variance[k] = static_cast<float>(1 / information);
   }
+  return frame;
 }
 
 struct Decade {
   double count = 0;
   double per_bound2 = 0;
+  double per_sensor2 = 0;
+  double per_plain2 = 0;
   double per_sigma2 = 0;
   double within = 0;
   double error = 0;
   double truth = 0;
   double error2 = 0;
+
+  void Add(const Value& value) {
+    const auto off = static_cast<double>(value.rd - value.truth);
+    const auto in = [&](float unit) {
+      return std::pow(off / static_cast<double>(unit), 2);
+    };
+    count += 1;
+    per_bound2 += in(value.bound);
+    per_sensor2 += in(value.sensor_bound);
+    per_plain2 += in(value.plain);
+    per_sigma2 += in(value.sigma);
+    within += std::abs(off) <= static_cast<double>(value.sigma) ? 1.0 : 0.0;
+    error += off;
+    truth += static_cast<double>(value.truth);
+    error2 += off * off;
+  }
 };
 
 struct Figures {
   std::array<Decade, 6> decades;  // of R_d / peak: down to 0.1, 0.01, …; and all
+  double aside_mm = 0;            // points lit from grid points, rms
   double total_bias = 0;
   double total_rms = 0;
   double total_worst = 0;
   double totals = 0;
 };
 
-void AddValue(Decade& decade, double truth, double error, double sigma, double bound) {
-  decade.count += 1;
-  decade.per_bound2 += error * error / (bound * bound);
-  decade.per_sigma2 += error * error / (sigma * sigma);
-  decade.within += std::abs(error) <= sigma ? 1.0 : 0.0;
-  decade.error += error;
-  decade.truth += truth;
-  decade.error2 += error * error;
-}
-
 class Comparison {
  public:
   Comparison(const std::filesystem::path& folder,
-             const calibrate::Calibration& calibration)
-      : session_(folder / "session"),
+             const calibrate::Calibration& calibration,
+             bool at_grid)
+      : folder_(folder),
+        at_grid_(at_grid),
+        session_(folder / "session"),
         calibration_(calibration),
         reader_(folder / "x.rd.exr"),
         header_(reader_.header()),
-        weights_(CellLattice(header_), calibration.camera, 0, 0),
+        weights_(CellLattice(header_), calibration.camera, {}, 0),
+        sharp_weights_(CellLattice(header_),
+                       calibration.camera,
+                       internal::SpotOf(session_, calibration),
+                       0),
+        glare_(calibration.corrections.glare,
+               calibration.camera.width_px,
+               calibration.camera.height_px),
         transport_(rigs::MakeTransport(rigs::ReadPhantom(folder / "phantom.toml"),
                                        rigs::Solver::kFast)) {}
 
-  Figures Run() {
+  /// `each` is told of every valid value.
+  template <class Each>
+  Figures Run(Each&& each) {
     Figures figures;
-    std::vector<PointMm> points;
-    for (std::int64_t s = 0; s < header_.PointCount(); ++s) {
-      points.push_back(header_.GridPoint(static_cast<int>(s % header_.points_x),
-                                         static_cast<int>(s / header_.points_x)));
-    }
-    std::vector<std::vector<float>> truth(points.size());
-    transport_->SolveWindows(points, [&](std::size_t k, rigs::Window&& window) {
-      truth[k] = std::move(window.rd);
-    });
-    float peak = 0;
+    const std::vector<std::vector<float>> truth = Truth(figures);
     for (const auto& window : truth) {
-      peak = std::max(peak, *std::max_element(window.begin(), window.end()));
+      peak_ = std::max(peak_, *std::max_element(window.begin(), window.end()));
     }
     for (int group = 0; group < session_.schedule().group_count(); ++group) {
       for (int c = 0; c < session_.rig().ChannelCount(); ++c) {
-        Compare(group, c, static_cast<double>(peak), truth, figures);
+        Compare(group, c, truth, figures, each);
       }
     }
     return figures;
   }
 
  private:
+  std::vector<PointMm> GridPoints() const {
+    std::vector<PointMm> points;
+    for (std::int64_t s = 0; s < header_.PointCount(); ++s) {
+      points.push_back(header_.GridPoint(static_cast<int>(s % header_.points_x),
+                                         static_cast<int>(s / header_.points_x)));
+    }
+    return points;
+  }
+
+  std::vector<std::vector<float>> Truth(Figures& figures) const {
+    const std::vector<PointMm> grid = GridPoints();
+    std::vector<std::vector<PointMm>> lit(grid.size());
+    for (std::size_t s = 0; s < grid.size(); ++s) {
+      lit[s] = {grid[s]};
+    }
+    if (!at_grid_) {
+      lit = bench::PointsLit(folder_, session_);
+    }
+    std::vector<PointMm> points;
+    std::vector<std::size_t> slices;
+    double square = 0;
+    for (std::size_t s = 0; s < grid.size(); ++s) {
+      PointMm off;
+      for (const PointMm& point : lit[s]) {
+        points.push_back(point);
+        slices.push_back(s);
+        off.x += (point.x - grid[s].x) / static_cast<double>(lit[s].size());
+        off.y += (point.y - grid[s].y) / static_cast<double>(lit[s].size());
+      }
+      square += off.x * off.x + off.y * off.y;
+    }
+    figures.aside_mm = std::sqrt(square / static_cast<double>(grid.size()));
+    std::vector<std::vector<float>> truth(grid.size());
+    transport_->SolveWindows(points, [&](std::size_t k, rigs::Window&& window) {
+      std::vector<float>& mean = truth[slices[k]];
+      mean.resize(window.rd.size(), 0.0F);
+      for (std::size_t at = 0; at < mean.size(); ++at) {
+        mean[at] += window.rd[at] / static_cast<float>(lit[slices[k]].size());
+      }
+    });
+    return truth;
+  }
+
   RateFrame Rates(int group, int channel) const {
     std::vector<acquire::Frame> frames;
     const acquire::Schedule& schedule = session_.schedule();
@@ -244,17 +220,20 @@ class Comparison {
         frames.push_back(session_.ReadFrame(n));
       }
     }
-    RateFrame rates = internal::MergeExposures(frames, calibration_);
-    KeepPhotonNoise(session_, calibration_, rates);
-    return rates;
+    return internal::MergeExposures(frames, calibration_);
   }
 
+  template <class Each>
   void Compare(int group,
                int channel,
-               double peak,
                const std::vector<std::vector<float>>& truths,
-               Figures& figures) {
-    const RateFrame rates = Rates(group, channel);
+               Figures& figures,
+               Each&& each) {
+    const RateFrame merged = Rates(group, channel);
+    const RateFrame photons = WithNoise(session_, calibration_, true, merged);
+    const RateFrame sensor = WithNoise(session_, calibration_, false, merged);
+    RateFrame sharp = merged;
+    glare_.Remove(sharp.rate);
     for (const auto& [i, j] : session_.schedule().Group(group)) {
       const RdSlice slice = reader_.ReadSlice(i, j);
       const PointMm x_i = header_.GridPoint(i, j);
@@ -267,25 +246,42 @@ class Comparison {
         if (slice.valid[at] == 0) {
           continue;
         }
-        const auto truth = static_cast<double>(
-            truths[static_cast<std::size_t>(j * header_.points_x + i)][at]);
-        const double error = static_cast<double>(slice.rd[at]) - truth;
-        sum_truth += truth;
-        sum_error += error;
+        const float truth =
+            truths[static_cast<std::size_t>(j * header_.points_x + i)][at];
         const PointMm d = header_.Offset(u, v);
         const PointMm x_o{x_i.x + d.x, x_i.y + d.y};
         const double factor = calibration_.RdPerRate(channel, x_i, x_o, header_.eta);
-        const auto value = weights_.Mean(rates, weights_.lattice().Index(i + u, j + v));
+        const std::int64_t at_lattice = weights_.lattice().Index(i + u, j + v);
+        const auto seen = weights_.Mean(photons, at_lattice);
+        const double mean = factor * seen.mean;
         // A mean rate that was measured is as good as the true one, but where few
         // photons came.
-        const double bound =
-            factor * std::sqrt(value.variance) *
-            std::sqrt(truth / std::max(value.mean * factor, 0.5 * truth));
-        const double level = std::log10(peak / truth);
-        const auto decade = static_cast<std::size_t>(std::clamp(level, 0.0, 4.0));
-        const auto sigma = static_cast<double>(slice.sigma[at]);
-        AddValue(figures.decades[decade], truth, error, sigma, bound);
-        AddValue(figures.decades[5], truth, error, sigma, bound);
+        const double few = std::sqrt(static_cast<double>(truth) /
+                                     std::max(mean, 0.5 * static_cast<double>(truth)));
+        const Value value{
+            .channel = static_cast<float>(channel),
+            .i = static_cast<float>(i),
+            .j = static_cast<float>(j),
+            .u = static_cast<float>(u),
+            .v = static_cast<float>(v),
+            .truth = truth,
+            .rd = slice.rd[at],
+            .sigma = slice.sigma[at],
+            .bound = static_cast<float>(
+                factor * few *
+                std::sqrt(sharp_weights_.Mean(photons, at_lattice).variance)),
+            .sensor_bound = static_cast<float>(
+                factor * std::sqrt(sharp_weights_.Mean(sensor, at_lattice).variance)),
+            .plain = static_cast<float>(factor * std::sqrt(seen.variance) * few),
+            .glare = static_cast<float>(
+                mean - factor * weights_.Mean(sharp, at_lattice).mean)};
+        const float level = std::log10(peak_ / truth);
+        figures.decades[static_cast<std::size_t>(std::clamp(level, 0.0F, 4.0F))].Add(
+            value);
+        figures.decades[5].Add(value);
+        each(value);
+        sum_truth += static_cast<double>(truth);
+        sum_error += static_cast<double>(slice.rd[at] - truth);
       }
       const double total = sum_error / sum_truth;
       figures.total_bias += total;
@@ -295,12 +291,17 @@ class Comparison {
     }
   }
 
+  std::filesystem::path folder_;
+  bool at_grid_;
   acquire::SessionReader session_;
   const calibrate::Calibration& calibration_;
   RdReader reader_;
   RdHeader header_;
   internal::CellWeights weights_;
+  internal::CellWeights sharp_weights_;
+  calibrate::GlareFilter glare_;
   std::shared_ptr<const rigs::Transport> transport_;
+  float peak_ = 0;
 };
 
 void Print(const Figures& figures) {
@@ -310,17 +311,21 @@ void Print(const Figures& figures) {
     const Decade& d = figures.decades[n];
     if (d.count > 0) {
       std::printf(
-          "  %-12s %7.0f values: error/bound %6.2f  error/sigma %5.2f  within 1 "
-          "sigma %4.1f %%  bias %+.3f %%  rms/mean %.3f %%\n",
+          "  %-12s %7.0f values: error/bound %6.2f (sensor %6.2f, no blur %6.2f)  "
+          "error/sigma "
+          "%5.2f  within 1 sigma %4.1f %%  bias %+.3f %%  rms/mean %.3f %%\n",
           kNames[n],
           d.count,
           std::sqrt(d.per_bound2 / d.count),
+          std::sqrt(d.per_sensor2 / d.count),
+          std::sqrt(d.per_plain2 / d.count),
           std::sqrt(d.per_sigma2 / d.count),
           100 * d.within / d.count,
           100 * d.error / d.truth,
           100 * std::sqrt(d.error2 / d.count) / (d.truth / d.count));
     }
   }
+  std::printf("  points lit %.4f mm rms from grid points\n", figures.aside_mm);
   std::printf("  totals: bias %+.3f %%, rms %.3f %%, worst %.3f %%\n",
               100 * figures.total_bias / figures.totals,
               100 * std::sqrt(figures.total_rms / figures.totals),
@@ -340,9 +345,11 @@ double ReadingSeconds(const acquire::SessionReader& session) {
 }
 
 void Run(const Arguments& args) {
-  for (const Sample& sample : kSamples) {
+  for (const std::string& phantom : args.phantoms) {
     double start = Seconds();
-    const std::filesystem::path folder = Capture(args, sample);
+    bench::ErrorSession wanted = args.session;
+    wanted.phantom = phantom;
+    const std::filesystem::path folder = bench::CaptureErrorSession(wanted);
     const double captured = Seconds() - start;
     const acquire::SessionReader session(folder / "session");
     const calibrate::Calibration calibration = calibrate::Calibrate(session, {});
@@ -355,13 +362,23 @@ void Run(const Arguments& args) {
     std::printf(
         "%s: capture %.1f s; reconstruct %.2f s, reading alone %.2f s (%.0f %%)\n  "
         "%s\n",
-        sample.name,
+        phantom.c_str(),
         captured,
         reconstructed,
         reading,
         100 * reading / reconstructed,
         summary.Brief().c_str());
-    Print(Comparison(folder, calibration).Run());
+    std::FILE* file = args.values.empty()
+                          ? nullptr
+                          : std::fopen((args.values / phantom).c_str(), "wb");
+    Print(Comparison(folder, calibration, args.at_grid).Run([&](const Value& value) {
+      if (file != nullptr) {
+        std::fwrite(&value, sizeof(value), 1, file);
+      }
+    }));
+    if (file != nullptr) {
+      std::fclose(file);
+    }
     std::fflush(stdout);
   }
 }
@@ -372,24 +389,35 @@ void Run(const Arguments& args) {
 int main(int argc, char** argv) {
   using namespace nacre;
   reconstruct::Arguments args;
-  args.folder = std::filesystem::temp_directory_path() / "reconstruct_error";
+  args.session.folder = std::filesystem::temp_directory_path() / "reconstruct_error";
   bool keep = false;
   for (int n = 1; n < argc; ++n) {
     const std::string argument = argv[n];
     const auto value = [&] { return std::string(n + 1 < argc ? argv[++n] : ""); };
     if (argument == "--seed") {
-      args.seed = value();
+      args.session.seed = value();
     } else if (argument == "--spacing") {
-      args.spacing = value();
+      args.session.changes.emplace_back("spot_spacing_cells", value());
+    } else if (argument == "--at-grid") {
+      args.at_grid = true;
+    } else if (argument == "--phantom") {
+      args.phantoms = {value()};
+    } else if (argument == "--values") {
+      args.values = value();
+    } else if (argument == "--set") {
+      const std::string text = value();
+      const std::size_t equals = std::min(text.find('='), text.size() - 1);
+      args.session.changes.emplace_back(text.substr(0, equals),
+                                        text.substr(equals + 1));
     } else if (argument == "--keep") {
-      args.folder = value();
+      args.session.folder = value();
       keep = true;
     } else if (argument == "--specular") {
       args.options.specular_radius_cells = std::atof(value().c_str());
     } else if (argument == "--no-crosstalk") {
       args.options.subtract_crosstalk = false;
     } else {
-      args.rig = argument;
+      args.session.rig = argument;
     }
   }
   try {
@@ -399,7 +427,7 @@ int main(int argc, char** argv) {
     return 1;
   }
   if (!keep) {
-    std::filesystem::remove_all(args.folder);
+    std::filesystem::remove_all(args.session.folder);
   }
   return 0;
 }

@@ -254,6 +254,7 @@ Gloss MeasureGloss(const acquire::SessionReader& session,
                    const std::vector<int>& groups) {
   Gloss gloss;
   const Viewer viewer(calibration, camera);
+  Rings spots;
   for (int c = 0; c < session.rig().ChannelCount(); ++c) {
     const Rings reference = OnReference(session, calibration, c);
     const std::array<Rings, kBlocks> blocks =
@@ -272,6 +273,7 @@ Gloss MeasureGloss(const acquire::SessionReader& session,
     }
     const double sigma_mm =
         sum > 0 ? viewer.bin_mm() * std::sqrt(0.5 * square / sum) : viewer.bin_mm();
+    spots.Add(reference);
     Rings all;
     for (const Rings& block : blocks) {
       all.Add(block);
@@ -295,29 +297,11 @@ Gloss MeasureGloss(const acquire::SessionReader& session,
     gloss.reflectance.push_back(best);
     gloss.sigma.push_back(std::sqrt(scatter2 + 0.25 * other * other));
   }
-  return gloss;
-}
-
-void RemoveGloss(const RdHeader& header,
-                 const calibrate::Calibration& calibration,
-                 const Gloss& gloss,
-                 std::int64_t s,
-                 RdSlice& slice) {
-  const PointMm x_i = header.GridPoint(static_cast<int>(s % header.points_x),
-                                       static_cast<int>(s / header.points_x));
-  for (std::size_t c = 0; c < gloss.reflectance.size(); ++c) {
-    const auto at = c * static_cast<std::size_t>(header.WindowSize()) +
-                    static_cast<std::size_t>(header.WindowSize() / 2);
-    const double per_reflectance =
-        calibration.RdPerRate(static_cast<int>(c), x_i, x_i, header.eta) *
-        calibration.channels[c].flux_scale_counts_mm2_sr_per_us / std::numbers::pi /
-        header.CellAreaMm2();
-    if (slice.valid[at] != 0) {
-      slice.rd[at] -= static_cast<float>(gloss.reflectance[c] * per_reflectance);
-      slice.sigma[at] = std::hypot(
-          slice.sigma[at], static_cast<float>(gloss.sigma[c] * per_reflectance));
-    }
+  for (std::size_t k = 0; k < kBins && spots.sum[k] > 0; ++k) {
+    gloss.square_mm2.push_back(spots.square_mm2[k] / spots.count[k]);
+    gloss.log_density.push_back(std::log(spots.sum[k] / spots.count[k]));
   }
+  return gloss;
 }
 
 }  // namespace nacre::reconstruct::internal

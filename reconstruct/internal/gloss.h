@@ -3,8 +3,10 @@
 #include "acquire/session.h"
 #include "calibrate/calibration.h"
 #include "calibrate/session_state.h"
+#include "reconstruct/internal/cell_weights.h"
 #include "reconstruct/rd_dataset.h"
 
+#include <array>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -14,8 +16,14 @@ namespace nacre::reconstruct::internal {
 /// What the surface itself throws back at the lit point, a channel: it looks like a
 /// diffuse target of that reflectance, lit by the same spot.
 struct Gloss {
-  std::vector<double> reflectance;
-  std::vector<double> sigma;  ///< standard uncertainty
+  std::vector<double> reflectance = {};
+  std::vector<double> sigma = {};  ///< standard uncertainty
+  /// The spot on the reference: ln of its density at r², ascending.
+  std::vector<double> square_mm2 = {};
+  std::vector<double> log_density = {};
+
+  /// mm⁻², not normalised; 0 beyond what was looked at.
+  double Density(double r2_mm2) const;
 
   /// "gloss: sentence" with figures; empty if none was found.
   std::string Warning(const std::vector<std::string>& channels) const;
@@ -34,11 +42,31 @@ Gloss MeasureGloss(const acquire::SessionReader& session,
                    const calibrate::SamplePlane& plane,
                    const std::vector<int>& groups);
 
-/// Takes it away from the lit cell of slice s, and adds what is uncertain about it.
-void RemoveGloss(const RdHeader& header,
-                 const calibrate::Calibration& calibration,
-                 const Gloss& gloss,
-                 std::int64_t s,
-                 RdSlice& slice);
+/// Takes it away from slices.
+class GlossRemover {
+ public:
+  /// All must outlive this; `camera` sees the surface, `weights` are for it.
+  GlossRemover(const Gloss& gloss,
+               const calibrate::Calibration& calibration,
+               const calibrate::SamplePlane& plane,
+               const RdHeader& header,
+               const CellWeights& weights);
+
+  /// From the cells around the lit one of slice s, as they show a spot on the
+  /// reference; what is uncertain about it is added to their sigma.
+  void Remove(std::int64_t s, RdSlice& slice) const;
+
+ private:
+  static constexpr int kReach = 2;  // cells
+  static constexpr int kSide = 2 * kReach + 1;
+  // Of a spot on x_i, cell means in mm⁻² of all its light.
+  std::array<double, kSide * kSide> Response(int i, int j) const;
+
+  const Gloss& gloss_;
+  const calibrate::Calibration& calibration_;
+  const calibrate::SamplePlane& plane_;
+  const RdHeader& header_;
+  const CellWeights& weights_;
+};
 
 }  // namespace nacre::reconstruct::internal

@@ -66,18 +66,22 @@ struct Pixel {
     quad.Add(below[c]);
   }
 
-  // From pixel centre to `point`, in pixels.
-  Polygon::Corner Offset(Polygon::Corner point) const {
+  // From pixel centre, in pixels.
+  Polygon Offset(Polygon piece) const {
     const auto& q = quad.corners;
     const double ux = 0.5 * (q[1].x - q[0].x + q[2].x - q[3].x);
     const double uy = 0.5 * (q[1].y - q[0].y + q[2].y - q[3].y);
     const double vx = 0.5 * (q[3].x - q[0].x + q[2].x - q[1].x);
     const double vy = 0.5 * (q[3].y - q[0].y + q[2].y - q[1].y);
     const Polygon::Corner centre = quad.Centroid();
-    const double x = point.x - centre.x;
-    const double y = point.y - centre.y;
     const double determinant = ux * vy - uy * vx;
-    return {(x * vy - y * vx) / determinant, (y * ux - x * uy) / determinant};
+    for (std::size_t n = 0; n < piece.count; ++n) {
+      const double x = piece.corners[n].x - centre.x;
+      const double y = piece.corners[n].y - centre.y;
+      piece.corners[n] = {(x * vy - y * vx) / determinant,
+                          (y * ux - x * uy) / determinant};
+    }
+    return piece;
   }
 
   Polygon quad;
@@ -131,9 +135,19 @@ void CutRow(const CellLattice& lattice,
         const double share = piece.Area();
         constexpr double kNothing = 1e-12;
         if (share > kNothing) {
-          const Polygon::Corner offset = pixel.Offset(piece.Centroid());
-          pieces.push_back(
-              {lattice.Index(x, y), column, row, share, offset.x, offset.y});
+          const Polygon in_pixel = pixel.Offset(piece);
+          const Polygon::Corner offset = in_pixel.Centroid();
+          const Polygon::Squares squares = in_pixel.MeanSquares();
+          constexpr double kWhole = 1.0 / 12;
+          pieces.push_back({lattice.Index(x, y),
+                            column,
+                            row,
+                            share,
+                            offset.x,
+                            offset.y,
+                            squares.xx - kWhole,
+                            squares.yy - kWhole,
+                            squares.xy});
         }
       }
     }

@@ -33,6 +33,9 @@ struct PixelPiece {
   double share;  ///< of the cell's area
   double du;     ///< its centre from the pixel's, in pixels, right and
   double dv;     ///< down
+  double duu;    ///< and the mean squares from there, less those of a whole pixel
+  double dvv;
+  double duv;
 };
 
 /// Where a point seen on the sample's surface lies in the lattice; empty: where it is.

@@ -53,6 +53,25 @@ Polygon::Corner Polygon::Centroid() const {
   return {corners[0].x + x / twice, corners[0].y + y / twice};
 }
 
+Polygon::Squares Polygon::MeanSquares() const {
+  double twice = 0;
+  Squares sum;
+  for (std::size_t n = 1; n + 1 < count; ++n) {
+    const Corner& a = corners[0];
+    const Corner& b = corners[n];
+    const Corner& c = corners[n + 1];
+    const double cross = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    twice += cross;
+    // Of a triangle: by its corners and the sum of them.
+    const double x = a.x + b.x + c.x;
+    const double y = a.y + b.y + c.y;
+    sum.xx += cross * (a.x * a.x + b.x * b.x + c.x * c.x + x * x) / 12;
+    sum.yy += cross * (a.y * a.y + b.y * b.y + c.y * c.y + y * y) / 12;
+    sum.xy += cross * (a.x * a.y + b.x * b.y + c.x * c.y + x * y) / 12;
+  }
+  return {sum.xx / twice, sum.yy / twice, sum.xy / twice};
+}
+
 Polygon ClipToBox(const Polygon& polygon, double x0, double y0, double x1, double y1) {
   return ClipToHalfPlane(
       ClipToHalfPlane(

@@ -19,6 +19,14 @@ struct Polygon {
   double Area() const;
   /// Centre of gravity; the polygon must have an area.
   Corner Centroid() const;
+
+  /// Means of x², y² and x y over the polygon, which must have an area.
+  struct Squares {
+    double xx = 0;
+    double yy = 0;
+    double xy = 0;
+  };
+  Squares MeanSquares() const;
 };
 
 /// What of `polygon` lies within [x0, x1] × [y0, y1] [Sutherland74].

@@ -5,19 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 
 namespace nacre::reconstruct::internal {
 namespace {
 
 // At its rim a window may hold as much of the neighbours' light as of its own.
 constexpr double kUnspoilt = 0.8;
-
-// Of a window's half width: nearer to its spot tails aren't a prior.
-constexpr double kInner = 0.55;
-
-constexpr float kFirstSpread = 0.2F;
-constexpr float kLeastSpread = 0.02F;
 
 std::vector<int> GroupsOf(const RdHeader& header, const acquire::Schedule& schedule) {
   std::vector<int> groups(static_cast<std::size_t>(header.PointCount()), 0);
@@ -44,15 +37,6 @@ int SpacingOf(const RdHeader& header, const acquire::Schedule& schedule) {
 
 }  // namespace
 
-struct Separation::Outside {
-  int group;
-  int channel;
-  int column;
-  int row;
-  float rd;
-  float sigma;
-};
-
 Separation::Separation(const RdHeader& header,
                        const acquire::Schedule& schedule,
                        const GroupReader& reader,
@@ -67,10 +51,13 @@ Separation::Separation(const RdHeader& header,
       group_of_(GroupsOf(header, schedule)),
       lit_(reader.LitPoints()),
       tails_(header),
-      spread_(header.channels.size(), kFirstSpread) {
+      spread_(header.channels.size()) {
   const int spacing = SpacingOf(header, schedule);
   is_dense_ = spacing < header.core;
   spacing_ = spacing / (header.Radius() + 0.5);
+  for (Spreads& rings : spread_) {
+    rings.fill(kFirstSpread);
+  }
   for (std::int64_t s = 0; s < header.PointCount(); ++s) {
     for (int c = 0; c < channels_; ++c) {
       enter_factor_.push_back(static_cast<float>(
@@ -105,6 +92,7 @@ Separation::Node Separation::NodeOf(int u) const {
 Separation::Foreign Separation::Mix(const Foreign& a, const Foreign& b, float second) {
   return {std::lerp(a.light, b.light, second),
           std::lerp(a.variance, b.variance, second),
+          std::lerp(a.square, b.square, second),
           a.hides};
 }
 
@@ -115,7 +103,6 @@ Separation::Foreign Separation::ForeignAt(std::int64_t s,
   const int radius = header_.Radius();
   const int i = static_cast<int>(s % header_.points_x);
   const int j = static_cast<int>(s / header_.points_x);
-  const float spread = spread_[static_cast<std::size_t>(channel)];
   const double inner2 = std::pow(kInner * (radius + 0.5), 2);
   Foreign foreign;
   for (const acquire::GridIndex& other :
@@ -127,8 +114,10 @@ Separation::Foreign Separation::ForeignAt(std::int64_t s,
       continue;
     }
     const float light = tails_.Extrapolate(other.i, other.j, channel, du, dv);
+    const float off = SpreadAt(channel, du, dv) * light;
     foreign.light += light;
-    foreign.variance += spread * light * spread * light;
+    foreign.square += light * light;
+    foreign.variance += off * off;
     foreign.hides = foreign.hides || du * du + dv * dv < inner2;
   }
   return foreign;
@@ -155,12 +144,15 @@ Separation::Value Separation::ValueOf(
   const int dv = v - header_.Radius();
   const bool is_inner =
       du * du + dv * dv < std::pow(kInner * (header_.Radius() + 0.5), 2);
-  const float own = is_inner ? 0.0F : tails_.Extrapolate(i, j, channel, du, dv);
+  // Where windows don't overlap what is seen is better than any prior: tails are nearly
+  // never off by as little as noise.
+  const float own =
+      is_inner || !is_dense_ ? 0.0F : tails_.Extrapolate(i, j, channel, du, dv);
   if (!(own > 0)) {
     return {seen - other.light, noise2 + other.variance, other.light};
   }
-  const float spread = spread_[static_cast<std::size_t>(channel)];
-  const float own2 = spread * own * spread * own;
+  const float own_off = SpreadAt(channel, du, dv) * own;
+  const float own2 = own_off * own_off;
   if (other.hides) {
     return {own, own2, seen - own};
   }
@@ -261,201 +253,6 @@ void Separation::FitSlices(double outer) {
     }
   });
   tails_ = std::move(fitted);
-}
-
-// How far tails are from what is seen where little of it is of other spots: between the
-// inner part and where the next spot begins to matter.
-void Separation::MeasureSpread() {
-  constexpr std::int64_t kSlices = 400;
-  const std::int64_t count = std::min(kSlices, header_.PointCount());
-  const int radius = header_.Radius();
-  const double outer = std::min(kUnspoilt, 0.45 * spacing_) * (radius + 0.5);
-  std::vector<double> sums(static_cast<std::size_t>(count * channels_ * 2), 0.0);
-  ParallelFor(count, thread_count_, [&](std::int64_t n) {
-    const std::int64_t s = n * header_.PointCount() / count;
-    for (int c = 0; c < channels_; ++c) {
-      const auto at = static_cast<std::size_t>((n * channels_ + c) * 2);
-      for (int v = 0; v < header_.core; ++v) {
-        for (int u = 0; u < header_.core; ++u) {
-          const double r = std::hypot(u - radius, v - radius);
-          if (r < kInner * (radius + 0.5) || r > outer) {
-            continue;
-          }
-          const int group = group_of_[static_cast<std::size_t>(s)];
-          const int i = static_cast<int>(s % header_.points_x);
-          const int j = static_cast<int>(s / header_.points_x);
-          const float own = tails_.Extrapolate(i, j, c, u - radius, v - radius);
-          const Value value = At(s, c, u, v);
-          if (value.variance < 0 || !(own > 0)) {
-            continue;
-          }
-          const auto cell = static_cast<std::size_t>(c * lattice_.CellCount() +
-                                                     lattice_.Index(i + u, j + v));
-          const float enter = EnterFactor(s, c);
-          const auto noise = static_cast<double>(spool_.Sigma(group)[cell] * enter);
-          const auto foreign = static_cast<double>(value.foreign);
-          const auto seen = static_cast<double>(spool_.Rd(group)[cell] * enter);
-          const double off = seen - foreign - static_cast<double>(own);
-          sums[at] += off * off - noise * noise;
-          sums[at + 1] += static_cast<double>(own) * static_cast<double>(own);
-        }
-      }
-    }
-  });
-  for (int c = 0; c < channels_; ++c) {
-    double off2 = 0;
-    double own2 = 0;
-    for (std::int64_t n = 0; n < count; ++n) {
-      const auto at = static_cast<std::size_t>((n * channels_ + c) * 2);
-      off2 += sums[at];
-      own2 += sums[at + 1];
-    }
-    spread_[static_cast<std::size_t>(c)] =
-        own2 > 0 ? std::max(kLeastSpread,
-                            static_cast<float>(std::sqrt(std::max(0.0, off2 / own2))))
-                 : kFirstSpread;
-  }
-}
-
-// A picture's spots enter at slightly different angles; for tails the first one's
-// factor is good enough for all.
-std::vector<Separation::Outside> Separation::SampleOutside() const {
-  std::vector<Outside> outside;
-  for (int group = 0; group < schedule_.group_count(); ++group) {
-    if (!spool_.Holds(group)) {
-      continue;
-    }
-    const auto spots = schedule_.Group(group);
-    const std::int64_t first = std::int64_t{spots[0].j} * header_.points_x + spots[0].i;
-    const auto is_outside = [&](int column, int row) {
-      return std::none_of(
-          spots.begin(), spots.end(), [&](const acquire::GridIndex& spot) {
-            return column >= spot.i && column < spot.i + header_.core &&
-                   row >= spot.j && row < spot.j + header_.core;
-          });
-    };
-    // A stride prime to the lattice's width walks through all columns and rows.
-    constexpr std::int64_t kSamples = 256;
-    std::int64_t stride = std::max<std::int64_t>(1, lattice_.CellCount() / kSamples);
-    while (std::gcd(stride, std::int64_t{lattice_.columns}) != 1) {
-      ++stride;
-    }
-    for (std::int64_t cell = group % stride; cell < lattice_.CellCount();
-         cell += stride) {
-      const int column = static_cast<int>(cell % lattice_.columns);
-      const int row = static_cast<int>(cell / lattice_.columns);
-      if (!is_outside(column, row)) {
-        continue;
-      }
-      for (int c = 0; c < channels_; ++c) {
-        const auto at = static_cast<std::size_t>(c * lattice_.CellCount() + cell);
-        const float sigma = spool_.Sigma(group)[at];
-        if (sigma >= 0) {
-          const float enter = EnterFactor(first, c);
-          outside.push_back(
-              {group, c, column, row, spool_.Rd(group)[at] * enter, sigma * enter});
-        }
-      }
-    }
-  }
-  return outside;
-}
-
-namespace {
-
-constexpr std::size_t kNodeCount = TailMap::kNodes.size();
-using Nodes = std::array<double, kNodeCount>;
-
-// What one cell outside the windows says: Σ_n falloff_n · light_n = seen.
-struct FalloffRow {
-  Nodes light{};  ///< extrapolated, by way of each node
-  double all = 0;
-  double seen = 0;
-  double variance = 0;
-  std::size_t nearest = 0;  ///< the node that most of it goes by
-};
-
-// Adds what the tails' own spread makes of a row's trustworthiness. Within a distance
-// it is in proportion to the light, so that the fit gets the sum of the light right: to
-// weigh relative errors would trust tails that are too faint the most.
-void AddModelVariance(std::vector<FalloffRow>& rows) {
-  constexpr double kSpread = 0.1;
-  Nodes sum{};
-  Nodes count{};
-  for (const FalloffRow& row : rows) {
-    sum[row.nearest] += row.all;
-    count[row.nearest] += 1;
-  }
-  for (FalloffRow& row : rows) {
-    row.variance += kSpread * kSpread * row.all * sum[row.nearest] / count[row.nearest];
-  }
-}
-
-// Non-negative least squares by multiplicative steps [Lee01], which leave a node alone
-// that no row tells of.
-Nodes SolveFalloff(const std::vector<FalloffRow>& rows) {
-  constexpr int kSteps = 200;
-  Nodes falloff;
-  falloff.fill(1);
-  for (int step = 0; step < kSteps; ++step) {
-    Nodes seen{};
-    Nodes predicted{};
-    for (const FalloffRow& row : rows) {
-      const double sum =
-          std::inner_product(falloff.begin(), falloff.end(), row.light.begin(), 0.0);
-      for (std::size_t n = 0; n < kNodeCount; ++n) {
-        seen[n] += row.light[n] * row.seen / row.variance;
-        predicted[n] += row.light[n] * sum / row.variance;
-      }
-    }
-    // At a window's rim tails are what was fitted there.
-    for (std::size_t n = 1; n < kNodeCount; ++n) {
-      falloff[n] *= predicted[n] > 0 ? std::max(0.0, seen[n]) / predicted[n] : 1;
-    }
-  }
-  return falloff;
-}
-
-}  // namespace
-
-void Separation::FitFalloff(const std::vector<Outside>& outside) {
-  const int radius = header_.Radius();
-  for (int c = 0; c < channels_; ++c) {
-    tails_.SetFalloff(c, {1, 1, 1, 1, 1});
-    std::vector<FalloffRow> rows;
-    for (const Outside& cell : outside) {
-      if (cell.channel != c) {
-        continue;
-      }
-      FalloffRow row;
-      row.seen = static_cast<double>(cell.rd);
-      row.variance = std::pow(static_cast<double>(cell.sigma), 2);
-      for (const acquire::GridIndex& spot : schedule_.Group(cell.group)) {
-        const int du = cell.column - radius - spot.i;
-        const int dv = cell.row - radius - spot.j;
-        const auto light =
-            static_cast<double>(tails_.Extrapolate(spot.i, spot.j, c, du, dv));
-        const TailMap::Place place = tails_.PlaceOf(du, dv);
-        const auto node = static_cast<std::size_t>(place.node);
-        const auto second = static_cast<double>(place.second);
-        row.light[node] += (1 - second) * light;
-        row.light[node + 1] += second * light;
-        row.all += light;
-      }
-      row.nearest = static_cast<std::size_t>(
-          std::max_element(row.light.begin(), row.light.end()) - row.light.begin());
-      if (row.all > 0) {
-        rows.push_back(row);
-      }
-    }
-    AddModelVariance(rows);
-    const Nodes falloff = SolveFalloff(rows);
-    TailMap::Falloff rounded{};
-    std::transform(falloff.begin(), falloff.end(), rounded.begin(), [](double value) {
-      return static_cast<float>(value);
-    });
-    tails_.SetFalloff(c, rounded);
-  }
 }
 
 }  // namespace nacre::reconstruct::internal

@@ -6,6 +6,7 @@
 #include "reconstruct/internal/tails.h"
 #include "reconstruct/rd_dataset.h"
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -53,15 +54,26 @@ class Separation {
   /// Whether windows overlap, so that separating is not a small correction.
   bool IsDense() const { return is_dense_; }
   /// How far tails are off, relative, a channel.
-  float Spread(int channel) const { return spread_[static_cast<std::size_t>(channel)]; }
+  float Spread(int channel) const {
+    return spread_[static_cast<std::size_t>(channel)].front();
+  }
 
  private:
-  struct Outside;  // a cell of a picture outside all its windows
+  // A cell of a picture outside all its windows.
+  struct Outside {
+    int group;
+    int channel;
+    int column;
+    int row;
+    float rd;
+    float sigma;
+  };
 
   // The light of a picture's other spots in a window cell.
   struct Foreign {
     float light = 0;
     float variance = 0;
+    float square = 0;    // Σ light² of the spots
     bool hides = false;  // the cell is in another spot's inner part
   };
   Foreign ForeignAt(std::int64_t s, int channel, int u, int v) const;
@@ -74,6 +86,7 @@ class Separation {
   void FitSlices(double outer);
   void FitFalloff(const std::vector<Outside>& outside);
   void MeasureSpread();
+  float SpreadAt(int channel, int du, int dv) const;
   float EnterFactor(std::int64_t s, int channel) const {
     return enter_factor_[static_cast<std::size_t>(s * channels_ + channel)];
   }
@@ -91,7 +104,14 @@ class Separation {
   std::vector<float> enter_factor_;  // [slice][channel]
   bool has_tails_ = false;
   TailMap tails_;
-  std::vector<float> spread_;
+  // Of tails, relative, in rings from the inner part outwards.
+  static constexpr int kSpreadRings = 5;
+  static constexpr float kFirstSpread = 0.2F;
+  using Spreads = std::array<float, kSpreadRings>;
+  // Of a window's half width: nearer to its spot tails aren't a prior.
+  static constexpr double kInner = 0.55;
+  int RingOf(double cells) const;
+  std::vector<Spreads> spread_;
 };
 
 }  // namespace nacre::reconstruct::internal

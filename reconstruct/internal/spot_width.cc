@@ -84,4 +84,21 @@ double MeasureSpotSigmaMm(const acquire::SessionReader& session,
   return std::sqrt(std::max(0.0, *middle));
 }
 
+calibrate::SpotProfile SpotOf(const acquire::SessionReader& session,
+                              const calibrate::Calibration& calibration) {
+  const auto& spots = calibration.corrections.spots;
+  calibrate::SpotProfile mean;
+  if (spots.empty()) {
+    const double sigma_mm = MeasureSpotSigmaMm(session, calibration);
+    mean.xx_mm2 = mean.yy_mm2 = sigma_mm * sigma_mm;
+  }
+  for (const calibrate::SpotProfile& spot : spots) {
+    const auto count = static_cast<double>(spots.size());
+    mean.xx_mm2 += spot.xx_mm2 / count;
+    mean.xy_mm2 += spot.xy_mm2 / count;
+    mean.yy_mm2 += spot.yy_mm2 / count;
+  }
+  return mean;
+}
+
 }  // namespace nacre::reconstruct::internal

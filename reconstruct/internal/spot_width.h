@@ -12,4 +12,9 @@ namespace nacre::reconstruct::internal {
 double MeasureSpotSigmaMm(const acquire::SessionReader& session,
                           const calibrate::Calibration& calibration);
 
+/// The spot's moments as calibrated, the mean of the channels' (one set of weights
+/// serves all); without them a round spot of that width.
+calibrate::SpotProfile SpotOf(const acquire::SessionReader& session,
+                              const calibrate::Calibration& calibration);
+
 }  // namespace nacre::reconstruct::internal

@@ -27,16 +27,26 @@ struct Window {
 
 void AddSystematics(const RdHeader& header,
                     const calibrate::Calibration& calibration,
+                    double longest_us,
                     RdSlice& slice) {
   const auto window_size = static_cast<std::size_t>(header.WindowSize());
   const double held_out = calibration.laser_map_held_out_rms_mm;
   // Along one axis, in cells.
   const double off = (held_out > 0 ? held_out : calibration.laser_map_rms_mm) /
                      std::sqrt(2.0) / header.pitch_mm;
+  const calibrate::PixelPoint middle{0.5 * calibration.camera.width_px,
+                                     0.5 * calibration.camera.height_px};
+  const double rows =
+      header.pitch_mm / std::sqrt(calibration.camera.FootprintMm2(middle));
   for (std::size_t c = 0; c < header.channels.size(); ++c) {
     const double flux = calibration.channels[c].flux_scale_sigma;
     const double ripple = calibration.corrections.light_noise.ripple;
-    const auto scale2 = static_cast<float>(flux * flux + ripple * ripple);
+    const double flat = calibration.corrections.flat_field.sigma;
+    const auto scale2 = static_cast<float>(flux * flux + ripple * ripple + flat * flat);
+    const double row =
+        calibration.RdPerRate(static_cast<int>(c), {0, 0}, {0, 0}, header.eta) *
+        calibration.corrections.row_noise_counts / longest_us;
+    const auto row2 = static_cast<float>(row * row / rows);
     const auto off2 = static_cast<float>(off * off);
     const Window window{std::span(slice.rd).subspan(c * window_size, window_size),
                         header.core};
@@ -50,7 +60,7 @@ void AddSystematics(const RdHeader& header,
         const float along_x = window.LogSlope(cell, 1, u);
         const float along_y = window.LogSlope(cell, header.core, v);
         const float relative2 = scale2 + off2 * (along_x * along_x + along_y * along_y);
-        slice.sigma[at] = std::sqrt(slice.sigma[at] * slice.sigma[at] +
+        slice.sigma[at] = std::sqrt(slice.sigma[at] * slice.sigma[at] + row2 +
                                     relative2 * slice.rd[at] * slice.rd[at]);
       }
     }

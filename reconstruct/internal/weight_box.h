@@ -81,6 +81,19 @@ class WeightBox {
     weights_[Index(x - 1, y)] -= 0.5 * piece.share * piece.du;
     weights_[Index(x, y + 1)] += 0.5 * piece.share * piece.dv;
     weights_[Index(x, y - 1)] -= 0.5 * piece.share * piece.dv;
+    // And the curvature.
+    const double uu = 0.5 * piece.share * piece.duu;
+    const double vv = 0.5 * piece.share * piece.dvv;
+    const double uv = 0.25 * piece.share * piece.duv;
+    weights_[Index(x, y)] -= 2 * (uu + vv);
+    weights_[Index(x + 1, y)] += uu;
+    weights_[Index(x - 1, y)] += uu;
+    weights_[Index(x, y + 1)] += vv;
+    weights_[Index(x, y - 1)] += vv;
+    weights_[Index(x + 1, y + 1)] += uv;
+    weights_[Index(x - 1, y - 1)] += uv;
+    weights_[Index(x + 1, y - 1)] -= uv;
+    weights_[Index(x - 1, y + 1)] -= uv;
   }
 
   int left_;

@@ -11,6 +11,10 @@ namespace {
 // Cells moved by less than this share of the pitch stay where they are.
 constexpr double kNothing = 1e-3;
 
+// So many cells around a spot R_d bends strongly: edges need all their points there,
+// and those without blur.
+constexpr int kNear = 2;
+
 std::int64_t FirstPicture(const acquire::SessionReader& session, int group) {
   const acquire::Schedule& schedule = session.schedule();
   for (std::int64_t n = schedule.grid_begin(); n < schedule.size(); ++n) {
@@ -132,30 +136,34 @@ float WindowShift::Sharp(const RateFrame& rates, int pixel) const {
 }
 
 // The mean along an edge; 0 where it isn't seen whole.
-float WindowShift::Edge(const RateFrame& rates, std::size_t edge) const {
+float WindowShift::Edge(const RateFrame& rates, std::size_t edge, bool is_near) const {
+  const std::size_t step = is_near ? 1 : 2;
+  const auto pixel = [&](int at) {
+    return is_near ? Sharp(rates, at) : rates.rate[static_cast<std::size_t>(at)];
+  };
   float sum = 0;
-  for (std::size_t k = 0; k < kPoints; ++k) {
+  for (std::size_t k = step / 2; k < kPoints; k += step) {
     const Place& at = places_[edge * kPoints + k];
     if (at.pixel < 0) {
       return 0;
     }
     const int below = at.pixel + width_px_;
-    sum += std::lerp(
-        std::lerp(Sharp(rates, at.pixel), Sharp(rates, at.pixel + 1), at.right),
-        std::lerp(Sharp(rates, below), Sharp(rates, below + 1), at.right),
-        at.down);
+    sum += std::lerp(std::lerp(pixel(at.pixel), pixel(at.pixel + 1), at.right),
+                     std::lerp(pixel(below), pixel(below + 1), at.right),
+                     at.down);
   }
-  return sum / kPoints;
+  return sum * static_cast<float>(step) / kPoints;
 }
 
 void WindowShift::Move(const RateFrame& rates,
                        acquire::GridIndex cell,
                        PointMm cells,
+                       bool is_near,
                        std::span<float> means) const {
-  const float right = Edge(rates, Vertical(cell.i + 1, cell.j));
-  const float left = Edge(rates, Vertical(cell.i, cell.j));
-  const float bottom = Edge(rates, Horizontal(cell.i, cell.j + 1));
-  const float top = Edge(rates, Horizontal(cell.i, cell.j));
+  const float right = Edge(rates, Vertical(cell.i + 1, cell.j), is_near);
+  const float left = Edge(rates, Vertical(cell.i, cell.j), is_near);
+  const float bottom = Edge(rates, Horizontal(cell.i, cell.j + 1), is_near);
+  const float top = Edge(rates, Horizontal(cell.i, cell.j), is_near);
   means[static_cast<std::size_t>(lattice_.Index(cell.i, cell.j))] +=
       static_cast<float>(cells.x) * (right - left) +
       static_cast<float>(cells.y) * (bottom - top);
@@ -186,7 +194,7 @@ void WindowShift::Apply(const RateFrame& rates,
           return distance2(s, column, row) < own;
         });
         if (is_nearest) {
-          Move(rates, {column, row}, cells, means);
+          Move(rates, {column, row}, cells, own <= kNear * kNear, means);
         }
       }
     }

@@ -53,10 +53,11 @@ class WindowShift {
   float Sharp(const RateFrame& rates, int pixel) const;
   std::size_t Vertical(int column, int row) const;
   std::size_t Horizontal(int column, int row) const;
-  float Edge(const RateFrame& rates, std::size_t edge) const;
+  float Edge(const RateFrame& rates, std::size_t edge, bool is_near) const;
   void Move(const RateFrame& rates,
             acquire::GridIndex cell,
             PointMm cells,
+            bool is_near,
             std::span<float> means) const;
 
   CellLattice lattice_;

@@ -1,0 +1,112 @@
+#include "reconstruct/internal/gloss.h"
+
+#include "reconstruct/internal/nonnegative_fit.h"
+#include "reconstruct/internal/polygon.h"
+#include "reconstruct/internal/sharpener.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace nacre::reconstruct::internal {
+namespace {
+
+TEST(FitNonnegative, OfIndependentColumnsIsTheirPositivePart) {
+  Eigen::MatrixXd a = Eigen::MatrixXd::Identity(4, 3);
+  const Eigen::VectorXd x = FitNonnegative(a, Eigen::Vector4d(2, -1, 0.5, 7));
+  EXPECT_NEAR(x(0), 2, 1e-12);
+  EXPECT_EQ(x(1), 0);
+  EXPECT_NEAR(x(2), 0.5, 1e-12);
+}
+
+// [Karush39]: at the minimum the gradient is 0 where x isn't, and not downhill
+// elsewhere.
+TEST(FitNonnegative, MeetsTheConditionsOfTheMinimum) {
+  Eigen::MatrixXd a(12, 5);
+  Eigen::VectorXd b(12);
+  for (int i = 0; i < 12; ++i) {
+    for (int k = 0; k < 5; ++k) {
+      a(i, k) = std::exp(-0.3 * i * (k + 1)) + 0.1 * std::cos(7.0 * i + k);
+    }
+    b(i) = 1.5 * a(i, 0) - 0.7 * a(i, 2) + 0.4 * a(i, 4) + 0.05 * std::sin(3.0 * i);
+  }
+  const Eigen::VectorXd x = FitNonnegative(a, b);
+  const Eigen::VectorXd gradient = a.transpose() * (b - a * x);
+  int positive = 0;
+  for (int k = 0; k < 5; ++k) {
+    EXPECT_GE(x(k), 0);
+    positive += x(k) > 0 ? 1 : 0;
+    if (x(k) > 0) {
+      EXPECT_NEAR(gradient(k), 0, 1e-9);
+    } else {
+      EXPECT_LE(gradient(k), 1e-9);
+    }
+  }
+  EXPECT_GT(positive, 0);
+  EXPECT_LT(positive, 5);
+}
+
+TEST(Polygon, MeanSquaresOfARectangle) {
+  Polygon box;
+  for (const auto& [x, y] : {std::pair(1.0, 2.0), {3.0, 2.0}, {3.0, 2.5}, {1.0, 2.5}}) {
+    box.Add({x, y});
+  }
+  const Polygon::Squares squares = box.MeanSquares();
+  EXPECT_NEAR(squares.xx, 4 + 4.0 / 12, 1e-12);
+  EXPECT_NEAR(squares.yy, 2.25 * 2.25 + 0.25 / 12, 1e-12);
+  EXPECT_NEAR(squares.xy, 2 * 2.25, 1e-12);
+}
+
+// The inverse of a blur has the negative of its moments.
+TEST(Sharpener, HasTheNegativeMomentsOfTheSpot) {
+  calibrate::CameraGeometry camera;
+  camera.width_px = camera.height_px = 21;
+  camera.fx_px = camera.fy_px = 100;
+  camera.cx_px = camera.cy_px = 10;
+  camera.camera_from_sample_rotation = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  camera.camera_from_sample_translation_mm = {0, 0, 50};  // half a millimetre a pixel
+  const calibrate::SpotProfile spot{.xx_mm2 = 0.16, .xy_mm2 = 0.03, .yy_mm2 = 0.11};
+  constexpr int kSide = 11;
+  std::vector<double> weights(kSide * kSide, 0.0);
+  weights[kSide * 5 + 5] = 1;
+  Sharpener(spot, camera).Apply(weights, kSide, kSide);
+  double sum = 0;
+  double xx = 0;
+  double xy = 0;
+  double yy = 0;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    const double x = 0.5 * (k % kSide - 5);
+    const double y = -0.5 * (k / kSide - 5);
+    const double w = weights[static_cast<std::size_t>(k)];
+    sum += w;
+    xx += w * x * x;
+    xy += w * x * y;
+    yy += w * y * y;
+  }
+  EXPECT_NEAR(sum, 1, 1e-12);
+  EXPECT_NEAR(xx, -spot.xx_mm2, 1e-9);
+  EXPECT_NEAR(xy, -spot.xy_mm2, 1e-9);
+  EXPECT_NEAR(yy, -spot.yy_mm2, 1e-9);
+}
+
+TEST(Gloss, DensityOfAGaussianIsExactBetweenItsRings) {
+  Gloss gloss;
+  for (const double r2 : {0.0, 0.1, 0.4, 0.9}) {
+    gloss.square_mm2.push_back(r2);
+    gloss.log_density.push_back(std::log(3.0) - r2 / 0.2);
+  }
+  EXPECT_NEAR(gloss.Density(0.25), 3 * std::exp(-1.25), 1e-12);
+  EXPECT_NEAR(gloss.Density(0.05), 3 * std::exp(-0.25), 1e-12);
+  EXPECT_EQ(gloss.Density(1.0), 0);
+}
+
+TEST(Gloss, IsToldOfWhereItStandsOutOfItsUncertainty) {
+  const Gloss gloss{.reflectance = {0.05, 0.001}, .sigma = {0.002, 0.001}};
+  const std::string text = gloss.Warning({"R", "G"});
+  EXPECT_NE(text.find("5.00 +- 0.20 % in R"), std::string::npos) << text;
+  EXPECT_EQ(text.find("in G"), std::string::npos) << text;
+  EXPECT_EQ(Gloss{}.Warning({"R"}), "");
+}
+
+}  // namespace
+}  // namespace nacre::reconstruct::internal
