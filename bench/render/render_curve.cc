@@ -2,7 +2,7 @@
 //
 //   render_curve SCENE.xml [--truth T.exr] [--truth-spp N] [--integrator NAME] [--spp
 //   A,B,…]
-//                [--threads N] [-D name=value …]
+//                [--threads N] [--adaptive] [-D name=value …]
 //
 // Each line is a picture of its own: samples, CPU-seconds all in (the scene's reading
 // not), the part of them before the first path, and the relative L2 error against the
@@ -28,6 +28,7 @@ struct Arguments {
   std::string integrator = "fast";
   int truth_spp = 4096;
   int thread_count = 1;
+  bool adaptive = false;
   std::vector<int> spp{1, 2, 4, 8, 16, 32, 64};
   std::vector<std::string> defines;
 };
@@ -91,10 +92,12 @@ void Run(const Arguments& arguments) {
     options.thread_count = arguments.thread_count;
   }
   options.integrator = arguments.integrator;
+  options.adaptive = arguments.adaptive;
   std::vector<Row> rows;
   std::printf(
-      "| spp | CPU-s | before paths | relative L2 | lit points | questions |\n");
-  std::printf("|---|---|---|---|---|---|\n");
+      "| spp | CPU-s | before paths | relative L2 | lit points | questions | pairs "
+      "|\n");
+  std::printf("|---|---|---|---|---|---|---|\n");
   for (const int spp : arguments.spp) {
     options.spp = spp;
     const Rendering made = Render(scene, options);
@@ -102,13 +105,14 @@ void Run(const Arguments& arguments) {
     const double before =
         summary.build_s + summary.seen_s + summary.irradiance_s + summary.models_s;
     rows.push_back({summary.cpu_s, RelativeL2(made.image, truth)});
-    std::printf("| %d | %.1f | %.1f | %.2f %% | %lld | %lld |\n",
+    std::printf("| %d | %.1f | %.1f | %.2f %% | %lld | %lld | %lld |\n",
                 spp,
                 summary.cpu_s,
                 before,
                 100 * rows.back().error,
                 static_cast<long long>(summary.lit_points),
-                static_cast<long long>(summary.evaluations));
+                static_cast<long long>(summary.evaluations),
+                static_cast<long long>(summary.pairs));
     std::fflush(stdout);
   }
   PrintTimeTo(rows, 0.02);
@@ -127,6 +131,7 @@ int main(int argc, char** argv) {
   app.add_option("--integrator", arguments.integrator);
   app.add_option("--spp", arguments.spp)->delimiter(',');
   app.add_option("--threads", arguments.thread_count);
+  app.add_flag("--adaptive", arguments.adaptive);
   app.add_option("-D", arguments.defines)->allow_extra_args(false);
   try {
     app.parse(argc, argv);
