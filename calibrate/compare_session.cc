@@ -95,6 +95,7 @@ std::vector<Warning> CompareWithSession(const acquire::SessionReader& session,
   const acquire::CameraInfo& camera = session.manifest().camera;
   if (camera.width != calibration.camera.width_px ||
       camera.height != calibration.camera.height_px ||
+      camera.mosaic != calibration.corrections.filters.mosaic ||
       session.rig().ChannelCount() != static_cast<int>(calibration.channels.size())) {
     warnings.push_back({"other-rig",
                         "the session's camera or laser isn't the one that was "

@@ -248,6 +248,10 @@ void HardRig::KnowsWhenItIsStale() const {
   }
   EXPECT_THAT(names,
               ::testing::ElementsAre("stale-dark", "stale-geometry", "stale-flux"));
+  other.corrections.filters.mosaic = "RGGB";
+  const std::vector<Warning> of_another = CompareWithSession(session, other);
+  ASSERT_EQ(of_another.size(), 1U);
+  EXPECT_EQ(of_another[0].name, "other-rig");
 }
 
 // One test, as every test is a process of its own and would capture all of it again.
