@@ -260,7 +260,6 @@ internal::Gloss LookForGloss(const acquire::SessionReader& session,
                              const calibrate::Calibration& calibration,
                              const calibrate::CameraGeometry& camera,
                              const calibrate::SamplePlane& plane,
-                             const GroupReader& reader,
                              const ReconstructOptions& options) {
   // It is looked for pixel by pixel, and a mosaic has gaps.
   if (!options.remove_gloss || options.specular_radius_cells >= 0 ||
@@ -268,9 +267,16 @@ internal::Gloss LookForGloss(const acquire::SessionReader& session,
     return {};
   }
   constexpr int kGroups = 12;
+  const acquire::Schedule& schedule = session.schedule();
+  std::vector<bool> is_there(static_cast<std::size_t>(schedule.group_count()), true);
+  for (std::int64_t n = session.picture_count(); n < schedule.size(); ++n) {
+    if (schedule[n].group >= 0) {
+      is_there[static_cast<std::size_t>(schedule[n].group)] = false;
+    }
+  }
   std::vector<int> there;
-  for (int g = 0; g < session.schedule().group_count(); ++g) {
-    if (reader.IsThere(g)) {
+  for (int g = 0; g < schedule.group_count(); ++g) {
+    if (is_there[static_cast<std::size_t>(g)]) {
       there.push_back(g);
     }
   }
@@ -309,6 +315,12 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   for (const calibrate::Warning& warning : state.warnings) {
     summary.warnings.push_back(warning.name + ": " + warning.text);
   }
+  // First, so that the memory it takes is there for what follows.
+  const internal::Gloss gloss =
+      LookForGloss(session, of_rig, calibration.camera, state.plane, options);
+  if (std::string text = gloss.Warning(header.channels); !text.empty()) {
+    summary.warnings.push_back(std::move(text));
+  }
   const GroupReader reader(
       session, calibration, state, header, spot, options.thread_count);
   const std::filesystem::path work = WorkFile(out);
@@ -332,11 +344,6 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   }
   summary.is_dense = separation.IsDense();
   spool.Forget();
-  const internal::Gloss gloss =
-      LookForGloss(session, of_rig, calibration.camera, state.plane, reader, options);
-  if (std::string text = gloss.Warning(header.channels); !text.empty()) {
-    summary.warnings.push_back(std::move(text));
-  }
   const internal::GlossRemover remover(
       gloss, calibration, state.plane, header, reader.weights());
   const auto& exposures_us = session.rig().camera.exposures_us;
@@ -346,11 +353,11 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
       *std::max_element(exposures_us.begin(), exposures_us.end())};
   WriteSlices(finishing, options, header, separation, writer, summary, progress);
   if (summary.below_floor_count > 0) {
-    summary.warnings.push_back(
-        fmt::format("glare-floor: {} of {} values are below what glare leaves uncertain "
-                    "and are marked as not valid",
-                    summary.below_floor_count,
-                    header.PointCount() * header.SliceSize()));
+    summary.warnings.push_back(fmt::format(
+        "glare-floor: {} of {} values are below what glare leaves uncertain "
+        "and are marked as not valid",
+        summary.below_floor_count,
+        header.PointCount() * header.SliceSize()));
   }
   writer.Finish();
   RdReader written(out);

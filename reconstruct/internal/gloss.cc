@@ -230,8 +230,21 @@ std::vector<std::int64_t> PicturesOf(const acquire::SessionReader& session,
 
 }  // namespace
 
+namespace {
+
+constexpr double kSignificant = 3;
+
+}  // namespace
+
+bool Gloss::IsFound() const {
+  bool is_found = false;
+  for (std::size_t c = 0; c < reflectance.size(); ++c) {
+    is_found = is_found || reflectance[c] > kSignificant * sigma[c];
+  }
+  return is_found;
+}
+
 std::string Gloss::Warning(const std::vector<std::string>& channels) const {
-  constexpr double kSignificant = 3;
   std::string text;
   for (std::size_t c = 0; c < reflectance.size(); ++c) {
     if (reflectance[c] > kSignificant * sigma[c]) {

@@ -25,6 +25,8 @@ struct Gloss {
   /// mm⁻², not normalised; 0 beyond what was looked at.
   double Density(double r2_mm2) const;
 
+  /// In any channel, by more than three times its uncertainty.
+  bool IsFound() const;
   /// "gloss: sentence" with figures; empty if none was found.
   std::string Warning(const std::vector<std::string>& channels) const;
 };

@@ -91,7 +91,13 @@ void GlossRemover::Remove(std::int64_t s, RdSlice& slice) const {
   const int i = static_cast<int>(s % header_.points_x);
   const int j = static_cast<int>(s / header_.points_x);
   const PointMm x_i = header_.GridPoint(i, j);
-  const auto response = Response(i, j);
+  // Where none was found what it may be concerns the lit cell alone.
+  std::array<double, kSide * kSide> response{};
+  response[response.size() / 2] = 1 / header_.CellAreaMm2();
+  const bool is_found = gloss_.IsFound();
+  if (is_found) {
+    response = Response(i, j);
+  }
   const int radius = header_.Radius();
   for (std::size_t c = 0; c < gloss_.reflectance.size(); ++c) {
     const double rd_per_light =
@@ -111,7 +117,8 @@ void GlossRemover::Remove(std::int64_t s, RdSlice& slice) const {
         const double share =
             rd_per_light *
             response[static_cast<std::size_t>((v + kReach) * kSide + u + kReach)];
-        slice.rd[at] -= static_cast<float>(gloss_.reflectance[c] * share);
+        slice.rd[at] -=
+            is_found ? static_cast<float>(gloss_.reflectance[c] * share) : 0.0F;
         slice.sigma[at] =
             std::hypot(slice.sigma[at], static_cast<float>(gloss_.sigma[c] * share));
       }
