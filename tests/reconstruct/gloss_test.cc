@@ -19,7 +19,7 @@ TEST(FitNonnegative, OfIndependentColumnsIsTheirPositivePart) {
   EXPECT_NEAR(x(2), 0.5, 1e-12);
 }
 
-// [Karush39]: at the minimum the gradient is 0 where x isn't, and not downhill
+// At the minimum the gradient is 0 where x isn't, and not downhill
 // elsewhere.
 TEST(FitNonnegative, MeetsTheConditionsOfTheMinimum) {
   Eigen::MatrixXd a(12, 5);
