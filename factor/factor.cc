@@ -55,7 +55,10 @@ std::int64_t WorkingBytes(const reconstruct::RdHeader& header,
   return static_cast<std::int64_t>(bytes);
 }
 
-void AddNotes(const FactorOptions& options, int most_terms, FactorSummary& summary) {
+void AddNotes(const FactorOptions& options,
+              std::int64_t points,
+              int most_terms,
+              FactorSummary& summary) {
   if (most_terms < options.terms) {
     summary.notes.push_back(
         fmt::format("{} of {} terms are kept: the data have no more to rounding",
@@ -66,6 +69,12 @@ void AddNotes(const FactorOptions& options, int most_terms, FactorSummary& summa
     summary.notes.push_back(
         fmt::format("{:.2f} % of the cells were not measured; the model fills them",
                     100 * summary.missing_fraction));
+  }
+  if (summary.measured_slices < points) {
+    summary.notes.push_back(
+        fmt::format("errors are those of {} of {} slices (option check-slices)",
+                    summary.measured_slices,
+                    points));
   }
   if (summary.unfit_slices > 0) {
     summary.notes.push_back(fmt::format(
@@ -145,13 +154,8 @@ Factorization FactorSource(SliceSource& source,
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
   const std::int64_t working_bytes = WorkingBytes(source.header(), options);
-  internal::Job job{source,
-                    options,
-                    progress,
-                    clusterer,
-                    internal::TakeSample(source, options.sample_rows, options.seed),
-                    internal::Scan(source, options.thread_count),
-                    1};
+  internal::Job job{source, options, progress, clusterer, {}, {}};
+  internal::Look(job);
   const std::unique_ptr<internal::Method> method = make(job);
   Factorization result = internal::SearchTerms(
       job, *method, [&](const FactorSummary& found, Material& material) {
@@ -160,7 +164,7 @@ Factorization FactorSource(SliceSource& source,
   FactorSummary& summary = result.summary;
   summary.working_bytes = working_bytes;
   summary.passes = job.passes;
-  AddNotes(options, method->MostTerms(), summary);
+  AddNotes(options, source.header().PointCount(), method->MostTerms(), summary);
   summary.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -25,6 +25,8 @@ struct FactorOptions {
   int fill_rounds = 2;
   double bits = 0;
   double tail_weight = 1;
+  bool one_by_one = false;
+  int check_slices = 4096;
   int polynomial = 3;
   int window_rank = 1;
   int taps = 3;
@@ -78,6 +80,17 @@ struct FactorOptions {
           Range{0, 2},
           "of bilinear, nmf and reciprocal: 0 minimises the error in R_d, 1 that over "
           "the root of R_d, 2 that over R_d");
+    visit("one_by_one",
+          self.one_by_one,
+          Range{},
+          "of the SVDs: each term from the residual of those before, as the thesis has "
+          "it; the same to rounding, and slower");
+    visit("check_slices",
+          self.check_slices,
+          Range{0, 1e9},
+          "of the SVDs on 8192 slices and more: errors are measured on so many (at "
+          "least 4096), with one reading of the data for all; 0: on all of them, by two "
+          "more");
     visit("polynomial",
           self.polynomial,
           Range{0, 8},
@@ -129,7 +142,8 @@ struct FactorSummary {
   double log_rms = 0;         ///< rms of ln(model / measured) above 1e-5 of the peak
   double psnr_db = 0;         ///< 20 log10(peak / RMSE)
   double peak = 0;            ///< largest measurement, mm⁻²
-  double worst_slice = 0;     ///< largest relative L2 error of a slice
+  std::int64_t measured_slices = 0;  ///< that errors are of: all, or a sample
+  double worst_slice = 0;     ///< largest relative L2 error of these
   int worst_slice_i = 0;
   int worst_slice_j = 0;
   double worst_total =
@@ -154,11 +168,11 @@ struct Factorization {
 };
 
 /// Factors a dataset, in memory or streamed from its file. The SVDs read it four times
-/// (scan, sums, projection, errors), once more to cluster, `fill_rounds` times more if
-/// values are missing, and hold 512 slices and, a channel and cluster, 8 core⁴ bytes;
-/// bilinear reads it three times and holds all pairs of points, 5 bytes each. `bytes`
-/// and `error` add one or two readings for each number of terms tried. The same data,
-/// options and seed give the same bits whatever the thread count.
+/// (scan, sums, projection, errors), large data once (`check_slices`), once more to
+/// cluster, `fill_rounds` times more if values are missing; bilinear reads it three
+/// times and holds all pairs of points, 5 bytes each. What each holds and `bytes` and
+/// `error` add: README.md. The same data, options and seed give the same bits whatever
+/// the thread count.
 ///
 /// Throws a usage Error for an unknown method or an option out of range; BadData naming
 /// slice, channel and cell for a value that isn't finite; Interrupted.

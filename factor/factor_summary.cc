@@ -40,6 +40,7 @@ Json FactorSummary::ToJson() const {
           {"log_rms", log_rms},
           {"psnr_db", std::isfinite(psnr_db) ? Json(psnr_db) : Json()},
           {"peak", peak},
+          {"measured_slices", measured_slices},
           {"worst_slice", worst_slice},
           {"worst_slice_at", {worst_slice_i, worst_slice_j}},
           {"worst_total", worst_total},

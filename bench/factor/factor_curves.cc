@@ -3,10 +3,11 @@
 //   factor_curves OUT [quick] NAME=MEASURED.rd.exr,TRUTH.rd.exr
 //   NAME=noise:0.001,TRUTH.rd.exr …
 //
-// "quick" takes the plain models with 2, 4 and 10 terms alone.
+// "quick" leaves out one term, more than ten, and tail weights of 0.
 //
-// writes OUT.csv (a line a material) and OUT.svg (a row of panels a data set: errors
-// against the truth over the size of the file, and over CPU time). MEASURED is
+// writes OUT.csv (a line a material), OUT.svg (a row of panels a data set: errors
+// against the truth over the size of the file, and over CPU time) and OUT_thesis.svg
+// (error and compression against the number of terms). MEASURED is
 // factored; the errors are against TRUTH. "noise:N" measures the truth with photon
 // noise of N peaks at a channel's peak, and readout noise of 1e-5 peaks, which sigma
 // tells.
@@ -24,6 +25,8 @@
 #include <iterator>
 #include <numbers>
 
+#include "bench/factor/curve_picture.h"
+
 namespace nacre {
 namespace {
 
@@ -35,26 +38,40 @@ struct Model {
   double bits = 0;
   double log_weight = 0;
   double tail_weight = 1;
+  int polynomial = 3;
+  int sides = 0;
+  bool is_dashed = false;
+  int quick_terms = 10;  ///< the most where it should be quick
 };
 
 const std::vector<Model>& Models() {
   static const std::vector<Model> models{
-      {"svd, floats", "#999999", "svd", {1, 2, 5, 10, 20}, 32},
-      {"log-svd, floats", "#222222", "log-svd", {2, 5, 10, 20}, 32},
+      {"svd, floats", "#999999", "svd", {1, 2, 5, 10, 20}, 32, 0, 1, 3, 0, true},
+      {"log-svd, floats", "#222222", "log-svd", {2, 5, 10, 20}, 32, 0, 1, 3, 0, true},
       {"svd", "#56b4e9", "svd", {1, 2, 5, 10, 20}},
       {"log-svd", "#0072b2", "log-svd", {2, 5, 10, 20}},
+      {"sqrt-svd", "#004d7a", "sqrt-svd", {2, 5, 10, 20}},
       {"log-svd, log weight 1", "#009e73", "log-svd", {2, 5, 10, 20}, 0, 1},
-      {"bilinear, tail weight 0", "#e69f00", "bilinear", {1, 2, 4, 8}, 0, 0, 0},
-      {"bilinear", "#d55e00", "bilinear", {1, 2, 4, 8}},
-      {"reciprocal, tail weight 0", "#cc79a7", "reciprocal", {1, 2, 4, 8, 12}, 0, 0, 0},
-      {"reciprocal", "#aa0066", "reciprocal", {1, 2, 4, 8, 12}}};
+      {"tucker, P = 1", "#c9b458", "tucker", {1, 2, 5, 10, 20}, 0, 0, 1, 1, 0, true},
+      {"tucker, P = 2", "#a89030", "tucker", {1, 2, 5, 10, 20}, 0, 0, 1, 2, 0, true},
+      {"tucker, P = 3", "#8a7000", "tucker", {1, 2, 5, 10, 20}},
+      {"nmf", "#6a3d9a", "nmf", {2, 5, 10}},
+      {"profiles", "#b15928", "profiles", {1, 2, 3, 5}},
+      {"bilinear, tail weight 0", "#e69f00", "bilinear", {1, 2, 4}, 0, 0, 0},
+      {"bilinear", "#d55e00", "bilinear", {1, 2, 4, 6}},
+      {"reciprocal, tail weight 0", "#e78ac3", "reciprocal", {1, 2, 4}, 0, 0, 0},
+      {"reciprocal", "#aa0066", "reciprocal", {1, 2, 4}},
+      {"reciprocal, sides", "#e7298a", "reciprocal", {1, 2, 4}, 0, 0, 1, 3, 1}};
   return models;
 }
 
 struct Point {
   const Model* model;
+  int terms;
   double bytes;
+  double compression;
   double l2;
+  double rmse_over_mean;
   double log_rms;
   double cpu_seconds;
 };
@@ -115,8 +132,8 @@ std::vector<Point> Run(const std::string& name,
   std::vector<Point> points;
   for (const Model& model : Models()) {
     for (const int terms : model.terms) {
-      const bool is_main = model.log_weight == 0 && model.tail_weight == 1;
-      if (quick && !(is_main && (terms == 2 || terms == 4 || terms == 10))) {
+      if (quick &&
+          (model.tail_weight == 0 || terms == 1 || terms > model.quick_terms)) {
         continue;
       }
       factor::FactorOptions options;
@@ -125,6 +142,8 @@ std::vector<Point> Run(const std::string& name,
       options.bits = model.bits;
       options.log_weight = model.log_weight;
       options.tail_weight = model.tail_weight;
+      options.polynomial = model.polynomial;
+      options.sides = model.sides;
       const auto [m, s] = factor::Factor(dataset, options);
       if (s.terms < terms) {
         continue;  // the same as fewer terms
@@ -144,9 +163,13 @@ std::vector<Point> Run(const std::string& name,
                       e.log_rms,
                       s.worst_total,
                       s.cpu_seconds);
+      const auto bytes = static_cast<double>(s.bytes);
       points.push_back({&model,
-                        static_cast<double>(s.bytes),
+                        terms,
+                        bytes,
+                        static_cast<double>(s.dataset_bytes) / bytes,
                         e.relative_l2,
+                        s.rmse_over_mean,
                         e.log_rms,
                         s.cpu_seconds});
       std::fprintf(stderr, "%s %s %d\n", name.c_str(), model.name, terms);
@@ -155,102 +178,80 @@ std::vector<Point> Run(const std::string& name,
   return points;
 }
 
-constexpr double kPanelWidth = 420;
-constexpr double kPanelHeight = 300;
+using bench::Curve;
+using bench::CurvePanel;
 
-// One log-log panel with its upper left corner at (x, y): an error over bytes or time.
-std::string Panel(const std::vector<Point>& points,
-                  double Point::*over,
-                  double Point::*error,
-                  const std::string& title,
-                  double x,
-                  double y) {
-  double low = 1e300;
-  double high = 0;
-  double least = 1e300;
-  double most = 0;
-  for (const Point& p : points) {
-    low = std::min(low, p.*error);
-    high = std::max(high, p.*error);
-    least = std::min(least, p.*over);
-    most = std::max(most, p.*over);
-  }
-  const auto place = [](double value, double from, double to, double size) {
-    return size * std::log(value / from) / std::log(std::max(to / from, 1.001));
-  };
-  const auto label = [&](double value) {
-    return over == &Point::bytes ? fmt::format("{:.0f} kB", value / 1e3)
-                                 : fmt::format("{:.2g} CPU-s", value);
-  };
-  const double width = kPanelWidth - 90;
-  const double height = kPanelHeight - 70;
-  std::string svg = fmt::format(
-      "<g transform=\"translate({} {})\"><text y=\"-8\" font-weight=\"bold\">{}</text>"
-      "<rect width=\"{}\" height=\"{}\" fill=\"none\" stroke=\"#bbb\"/>"
-      "<text y=\"{}\">{}</text><text x=\"{}\" y=\"{}\" "
-      "text-anchor=\"end\">{}</text><text x=\"-4\" y=\"{}\" "
-      "text-anchor=\"end\">{:.2g}</text><text x=\"-4\" y=\"8\" "
-      "text-anchor=\"end\">{:.2g}</text>\n",
-      x + 50,
-      y + 30,
-      title,
-      width,
-      height,
-      height + 14,
-      label(least),
-      width,
-      height + 14,
-      label(most),
-      height,
-      low,
-      high);
+// A curve a model over what `x` and `y` take of a point.
+template <class X, class Y>
+CurvePanel Panel(const std::vector<Point>& points,
+                 const std::string& title,
+                 const std::string& x_label,
+                 const X& x,
+                 const Y& y) {
+  CurvePanel panel{title, x_label, true, {}};
   for (const Model& model : Models()) {
-    std::string line;
+    Curve curve{model.name, model.color, model.is_dashed, {}};
     for (const Point& p : points) {
       if (p.model == &model) {
-        const double px = place(p.*over, least, most, width);
-        const double py = height - place(p.*error, low, high, height);
-        line += fmt::format("{:.1f},{:.1f} ", px, py);
-        svg += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\"/>",
-                           px,
-                           py,
-                           model.color);
+        curve.points.emplace_back(x(p), y(p));
       }
     }
-    svg += fmt::format(
-        "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\"/>\n", line, model.color);
+    if (!curve.points.empty()) {
+      panel.curves.push_back(std::move(curve));
+    }
   }
-  return svg + "</g>\n";
+  return panel;
 }
 
-std::string Picture(
-    const std::vector<std::pair<std::string, std::vector<Point>>>& all) {
-  const double height = kPanelHeight * static_cast<double>(all.size()) + 40;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" "
-      "viewBox=\"0 0 {0} {1}\" font-family=\"sans-serif\" font-size=\"11\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-      3 * kPanelWidth,
-      height);
-  double y = 0;
+using DataPoints = std::vector<std::pair<std::string, std::vector<Point>>>;
+
+// Errors over size and time.
+std::string Picture(const DataPoints& all) {
+  std::vector<CurvePanel> panels;
   for (const auto& [name, points] : all) {
-    const std::string l2 = name + ": relative L2 error";
-    svg += Panel(points, &Point::bytes, &Point::l2, l2, 0, y);
-    svg += Panel(
-        points, &Point::bytes, &Point::log_rms, name + ": log error", kPanelWidth, y);
-    svg += Panel(points, &Point::cpu_seconds, &Point::l2, l2, 2 * kPanelWidth, y);
-    y += kPanelHeight;
+    const auto bytes = [](const Point& p) { return p.bytes / 1000; };
+    const auto l2 = [](const Point& p) { return p.l2; };
+    panels.push_back(Panel(points, name + ": relative L2 error", "kB", bytes, l2));
+    panels.push_back(
+        Panel(points, name + ": log error", "kB", bytes, [](const Point& p) {
+          return p.log_rms;
+        }));
+    panels.push_back(Panel(
+        points,
+        name + ": relative L2 error",
+        "CPU seconds",
+        [](const Point& p) { return std::max(p.cpu_seconds, 0.01); },
+        l2));
   }
-  double x = 20;
-  for (const Model& model : Models()) {
-    svg += fmt::format("<text x=\"{}\" y=\"{}\" fill=\"{}\">{}</text>",
-                       x,
-                       y + 16,
-                       model.color,
-                       model.name);
-    x += 118;
+  return CurvePicture(panels, 3);
+}
+
+// The thesis' figures: error and compression of the SVDs against S (4.8), and of the
+// Tucker model against T and P (4.6).
+std::string ThesisPicture(const DataPoints& all) {
+  std::vector<CurvePanel> panels;
+  for (const auto& [name, points] : all) {
+    std::vector<Point> svds;
+    std::vector<Point> tucker;
+    for (const Point& p : points) {
+      if (p.model->bits == 32) {
+        svds.push_back(p);
+      } else if (p.model->method == std::string("tucker")) {
+        tucker.push_back(p);
+      }
+    }
+    const auto terms = [](const Point& p) { return static_cast<double>(p.terms); };
+    const auto rmse = [](const Point& p) { return p.rmse_over_mean; };
+    const auto ratio = [](const Point& p) { return p.compression; };
+    panels.push_back(Panel(svds, name + ": RMSE over mean", "terms S", terms, rmse));
+    panels.push_back(Panel(svds, name + ": compression", "terms S", terms, ratio));
+    panels.push_back(Panel(tucker, name + ": RMSE over mean", "terms T", terms, rmse));
+    panels.push_back(Panel(tucker, name + ": compression", "terms T", terms, ratio));
   }
-  return svg + "</svg>\n";
+  for (CurvePanel& panel : panels) {
+    panel.log_x = false;
+  }
+  return CurvePicture(panels, 4);
 }
 
 int Main(int argc, char** argv) {
@@ -260,7 +261,7 @@ int Main(int argc, char** argv) {
   std::string csv =
       "dataset,model,terms,bits,bytes,relative_l2,log_rms,true_relative_l2,"
       "true_log_rms,worst_total,cpu_seconds\n";
-  std::vector<std::pair<std::string, std::vector<Point>>> all;
+  DataPoints all;
   bool quick = false;
   for (int n = 2; n < argc; ++n) {
     const std::string text = argv[n];
@@ -283,6 +284,7 @@ int Main(int argc, char** argv) {
   }
   WriteFile(std::string(argv[1]) + ".csv", csv);
   WriteFile(std::string(argv[1]) + ".svg", Picture(all));
+  WriteFile(std::string(argv[1]) + "_thesis.svg", ThesisPicture(all));
   return 0;
 }
 

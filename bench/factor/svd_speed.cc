@@ -22,6 +22,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/factor/soft_chessboard.h"
 #include "bench/factor/svd_oracle.h"
 
 namespace {
@@ -30,47 +31,6 @@ using nacre::bench::Oracle;
 using nacre::factor::internal::BlockSvds;
 using nacre::factor::internal::RowTransform;
 using nacre::reconstruct::RdDataset;
-
-// σ' of two media in a chessboard with soft borders and fine texture, 1/mm.
-double Attenuation(double x, double y) {
-  const double board = std::tanh(4 * std::sin(x) * std::sin(y));
-  return 1.2 + 0.6 * board + 0.15 * std::sin(3.1 * x + 2 * std::sin(1.7 * y)) +
-         0.08 * std::sin(17 * x) * std::cos(13 * y + x);
-}
-
-// exp(−σ r) z / r³, σ the mean over both ends and the middle of the way, with noise of
-// 1e-5 of the peak.
-RdDataset MakeData(int points_x, int points_y, int core) {
-  RdDataset data;
-  data.header = {points_x, points_y, core, 0.2, 1.4, {"Y"}, {}};
-  const auto window = static_cast<std::size_t>(core) * static_cast<std::size_t>(core);
-  const auto rows =
-      static_cast<std::size_t>(points_x) * static_cast<std::size_t>(points_y);
-  data.rd.resize(rows * window);
-  data.valid.assign(rows * window, 1);
-  const double step = 8 * 3.14159265 / points_x;
-  nacre::ParallelFor(static_cast<std::int64_t>(rows), 0, [&](std::int64_t row) {
-    const double x = static_cast<double>(row % points_x) * step;
-    const double y = static_cast<double>(row / points_x) * step;
-    std::uint64_t state = static_cast<std::uint64_t>(row) * 0x9E3779B97F4A7C15U + 1;
-    float* out = &data.rd[static_cast<std::size_t>(row) * window];
-    for (int v = 0; v < core; ++v) {
-      for (int u = 0; u < core; ++u) {
-        const double du = u - (core - 1) / 2;
-        const double dv = v - (core - 1) / 2;
-        const double sigma =
-            (Attenuation(x, y) + Attenuation(x + du * step, y + dv * step) +
-             Attenuation(x + 0.5 * du * step, y + 0.5 * dv * step)) /
-            3;
-        const double r = 0.2 * std::hypot(du, dv, 2.0);
-        state = state * 6364136223846793005U + 1442695040888963407U;
-        const double noise = static_cast<double>(state >> 11) * 0x1p-53 - 0.5;
-        *out++ = static_cast<float>(std::exp(-sigma * r) / (r * r * r) + 1e-5 * noise);
-      }
-    }
-  });
-  return data;
-}
 
 struct Clock {
   std::clock_t cpu = std::clock();
@@ -182,7 +142,8 @@ int main(int argc, char** argv) {
   }
   const int terms = argument(4, 10);
   const int repeats = argument(5, 5);
-  const RdDataset data = MakeData(argument(1, 277), argument(2, 277), argument(3, 39));
+  const RdDataset data = nacre::bench::MakeSoftChessboard(
+      argument(1, 277), argument(2, 277), argument(3, 39), 1);
   fmt::print("{} rows of {} floats, {:.0f} MB\n",
              data.header.PointCount(),
              data.header.WindowSize(),

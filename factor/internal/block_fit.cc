@@ -14,14 +14,6 @@ namespace {
 // The sample must be a small part for its passes to cost little.
 constexpr std::int64_t kLeastRows = 2 * kSvdSampleRows;
 
-bool BlocksPay(const reconstruct::RdHeader& header,
-               const SvdFitOptions& options,
-               const SvdModel& model) {
-  return options.cluster_count == 1 && header.PointCount() >= kLeastRows &&
-         4 * PaddedColumns(options.terms) <= header.WindowSize() &&
-         std::all_of(model.transforms.begin(), model.transforms.end(), FitsFloats);
-}
-
 bool HasMissing(const SvdModel& model, const reconstruct::RdHeader& header) {
   return std::any_of(
       model.scans.begin(), model.scans.end(), [&](const ChannelScan& scan) {
@@ -42,7 +34,15 @@ RowBasis ToBasis(const BlockSvd& svd, const reconstruct::RdHeader& header) {
   return basis;
 }
 
+// A reading of a file costs more than further columns.
+constexpr int kSpareOfFiles = 20;
+
 }  // namespace
+
+bool BlocksPay(const reconstruct::RdHeader& header, int terms) {
+  return header.PointCount() >= kLeastRows &&
+         4 * PaddedColumns(terms) <= header.WindowSize();
+}
 
 void FitByBlocks(SliceSource& source,
                  const SvdFitOptions& options,
@@ -59,6 +59,12 @@ void FitByBlocks(SliceSource& source,
                         float* y) {
     const auto offset =
         (static_cast<std::size_t>(row) * channel_count + channel) * window;
+    if (options.rows != nullptr) {
+      options.rows->Add(channel, block.first + row, {block.rd + offset, window});
+      if (std::memchr(block.valid + offset, 0, window) != nullptr) {
+        options.rows->has_missing = true;
+      }
+    }
     if (!has_missing || std::memchr(block.valid + offset, 0, window) == nullptr) {
       return TransformFloats(model.transforms[channel], {block.rd + offset, window}, y);
     }
@@ -75,6 +81,7 @@ void FitByBlocks(SliceSource& source,
                         {.terms = options.terms,
                          .tolerance = options.tolerance,
                          .least_passes = has_missing ? 1 + options.fill_rounds : 1,
+                         .spare = source.in_memory() ? 4 : kSpareOfFiles,
                          .thread_count = options.thread_count});
   std::vector<RowBasis> bases(channel_count);
   solver.OnBasis([&](std::size_t channel, const BlockSvd& svd) {
@@ -83,7 +90,11 @@ void FitByBlocks(SliceSource& source,
       model.bases = bases;
     }
   });
-  const Sample sample = TakeSample(source, kSvdSampleRows, options.seed);
+  Sample taken;
+  if (options.sample == nullptr) {
+    taken = TakeSample(source, kSvdSampleRows, options.seed);
+  }
+  const Sample& sample = options.sample == nullptr ? taken : *options.sample;
   BlockSvds found = solver.Solve(*SourceOf(sample.dataset), source, progress);
   model.passes += found.passes;
   for (BlockSvd& svd : found.svds) {
@@ -98,7 +109,9 @@ void FitSvd(SliceSource& source,
             const SvdFitOptions& options,
             SvdModel& model,
             const ProgressFunction& progress) {
-  if (BlocksPay(source.header(), options, model)) {
+  if (options.cluster_count == 1 && !options.one_by_one &&
+      BlocksPay(source.header(), options.terms) &&
+      std::all_of(model.transforms.begin(), model.transforms.end(), FitsFloats)) {
     FitByBlocks(source, options, model, progress);
   } else {
     FitByGram(source, options, model, progress);

@@ -14,7 +14,6 @@
 namespace nacre::factor::internal {
 namespace {
 
-constexpr int kSpare = 4;  // columns beyond the terms, at least
 constexpr int kMostSamplePasses = 16;
 // The sample's own basis is no nearer to that of all rows than a few thousandths.
 constexpr double kSampleTolerance = 1e-4;
@@ -127,7 +126,7 @@ BlockSvd ToSvd(const BlockProduct& product, Ritz ritz, Eigen::Index terms) {
 
 void BlockSvdSolver::Start(const reconstruct::RdHeader& header) {
   const Eigen::Index columns = header.WindowSize();
-  const Eigen::Index size = PaddedColumns(options_.terms + kSpare);
+  const Eigen::Index size = PaddedColumns(options_.terms + options_.spare);
   RandomStream random(1, 0x626C6F636B);
   const auto draw = [&] { return random.Uniform() - 0.5; };
   const Eigen::MatrixXd start =

@@ -18,6 +18,7 @@ struct BlockSvdOptions {
   double tolerance = 1e-5;
   int least_passes = 1;
   int most_passes = 12;
+  int spare = 4;  ///< columns beyond the terms, at least: more save passes
   int thread_count = 0;
 };
 

@@ -15,7 +15,7 @@ struct FitError {
   std::int64_t used = 0;
   std::int64_t log_used = 0;
 
-  /// `floor` bounds both numbers in the logarithm.
+  /// `floor` bounds both numbers in the logarithm; infinity: none is taken.
   void Add(double measured, double modelled, double floor);
   FitError& operator+=(const FitError& other);
 

@@ -147,7 +147,7 @@ void FitByGram(SliceSource& source,
                 options.thread_count,
                 [&](std::int64_t n) {
                   const auto k = static_cast<std::size_t>(n);
-                  bases[k] = BasisOf(pass.sums()[k], options.terms);
+                  bases[k] = BasisOf(pass.sums()[k], options.terms, options.one_by_one);
                 });
     model.bases = std::move(bases);
     if (!has_missing) {

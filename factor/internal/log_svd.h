@@ -3,6 +3,7 @@
 #include "core/progress.h"
 #include "factor/internal/mean_slice.h"
 #include "factor/internal/row_basis.h"
+#include "factor/internal/row_scans.h"
 #include "factor/internal/row_transform.h"
 #include "factor/material.h"
 
@@ -12,15 +13,25 @@
 
 namespace nacre::factor::internal {
 
+struct Sample;
+
 /// What FitSvd needs to know beside the data.
 struct SvdFitOptions {
   int terms = 10;
   int cluster_count = 1;
   int fill_rounds = 2;  ///< times that missing values are predicted and fitted again
+  bool one_by_one = false;  ///< each term from what those before leave; FitByGram
   double tolerance = 1e-5;  ///< on the excess error, where found by iteration
   std::uint64_t seed = 1;   ///< of the rows that the iteration starts on
   int thread_count = 0;
+  /// Given both, FitByBlocks starts on these rows and, taking it that nothing is
+  /// missing, tells of all rows what it reads.
+  const Sample* sample = nullptr;
+  RowScans* rows = nullptr;
 };
+
+/// Whether FitByBlocks serves a matrix of these sizes.
+bool BlocksPay(const reconstruct::RdHeader& header, int terms);
 
 /// The thesis' model before it becomes a Material: a transform a channel and a basis of
 /// rows a channel and cluster.

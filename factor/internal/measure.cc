@@ -3,9 +3,11 @@
 #include "core/parallel.h"
 #include "factor/internal/material_codes.h"
 #include "factor/internal/reciprocal.h"
+#include "factor/internal/window_totals.h"
 #include "reconstruct/error_figures.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -76,8 +78,11 @@ void ScaleSlice(std::span<const float> rd,
   m.albedo[at] = RoundAlbedo(total * m.pitch_mm * m.pitch_mm, !m.steps.empty());
 }
 
+// `row_of` gives the slice that a fit is of.
+template <class RowOf>
 void Summarize(const Job& job,
                const std::vector<SliceFit>& fits,
+               const RowOf& row_of,
                const Material& m,
                FactorSummary& summary) {
   FitError sum;
@@ -90,8 +95,8 @@ void Summarize(const Job& job,
     summary.unfit_slices += fits[n].unfit;
     if (fits[n].worst_channel > summary.worst_slice) {
       summary.worst_slice = fits[n].worst_channel;
-      summary.worst_slice_i = static_cast<int>(n) % m.points_x;
-      summary.worst_slice_j = static_cast<int>(n) / m.points_x;
+      summary.worst_slice_i = static_cast<int>(row_of(n) % m.points_x);
+      summary.worst_slice_j = static_cast<int>(row_of(n) / m.points_x);
     }
   }
   const auto cells = static_cast<double>(m.PointCount() * m.WindowSize()) *
@@ -104,15 +109,90 @@ void Summarize(const Job& job,
   summary.psnr_db = rmse > 0 && summary.peak > 0
                         ? 20 * std::log10(summary.peak / rmse)
                         : std::numeric_limits<double>::infinity();
-  summary.missing_fraction = 1 - static_cast<double>(sum.used) / cells;
+  summary.measured_slices = std::ssize(fits);
+  summary.missing_fraction =
+      1 - static_cast<double>(sum.used) / (cells * static_cast<double>(fits.size()) /
+                                           static_cast<double>(m.PointCount()));
   summary.dataset_bytes = static_cast<std::int64_t>(cells * sizeof(float));
   summary.terms = m.terms;
   summary.clusters = m.cluster_count;
 }
 
+// How far a slice's total is off, once scaled to steps.
+void AddTotal(double measured, double modelled, SliceFit& fit) {
+  if (measured > 0 && modelled > 0) {
+    fit.worst_total = std::max(fit.worst_total, std::abs(modelled / measured - 1));
+  } else if (measured != 0 || modelled != 0) {
+    ++fit.unfit;
+  }
+}
+
+// row_scale and albedo of all slices by the totals that the fit left.
+SliceFit ScaleAll(const Job& job, Material& m) {
+  constexpr std::int64_t kBlock = 256;
+  const std::int64_t points = m.PointCount();
+  const std::int64_t blocks = (points + kBlock - 1) / kBlock;
+  std::vector<SliceFit> fits(m.channels.size() * static_cast<std::size_t>(blocks));
+  ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t task) {
+    const auto channel = static_cast<int>(task / blocks);
+    const std::int64_t first = task % blocks * kBlock;
+    const std::int64_t count = std::min(kBlock, points - first);
+    std::array<double, kBlock> totals{};
+    WindowTotals(m, channel, first, count, totals.data());
+    for (std::int64_t n = 0; n < count; ++n) {
+      const auto at = static_cast<std::size_t>(channel * points + first + n);
+      const double modelled = totals[static_cast<std::size_t>(n)];
+      const double scale = modelled > 0 ? std::max(0.0, job.totals[at] / modelled) : 1;
+      m.row_scale[at] = RoundScale(scale, m.steps.row_scale);
+      const double scaled = modelled * static_cast<double>(m.row_scale[at]);
+      m.albedo[at] = RoundAlbedo(scaled * m.pitch_mm * m.pitch_mm, !m.steps.empty());
+      AddTotal(job.totals[at], scaled, fits[static_cast<std::size_t>(task)]);
+    }
+  });
+  SliceFit all;
+  for (const SliceFit& fit : fits) {
+    all.worst_total = std::max(all.worst_total, fit.worst_total);
+    all.unfit += fit.unfit;
+  }
+  return all;
+}
+
+// Totals are those of all slices; errors are measured on some.
+void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
+  const SliceFit all = ScaleAll(job, m);
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const double floor = reconstruct::kLogFloor * job.Peak();
+  const reconstruct::RdDataset& data = job.check.dataset;
+  std::vector<SliceFit> fits(job.check.rows.size());
+  ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t row) {
+    const auto r = static_cast<std::size_t>(row);
+    const std::int64_t point = job.check.rows[r];
+    std::vector<float> values(window);
+    for (std::size_t c = 0; c < m.channels.size(); ++c) {
+      m.EvaluateWindow(static_cast<int>(c),
+                       static_cast<int>(point % m.points_x),
+                       static_cast<int>(point / m.points_x),
+                       values.data());
+      const std::size_t offset = (r * m.channels.size() + c) * window;
+      const FitError error = ErrorOf(
+          {&data.rd[offset], window}, {&data.valid[offset], window}, values, floor);
+      fits[r].error += error;
+      fits[r].worst_channel = std::max(fits[r].worst_channel, error.RelativeL2());
+    }
+  });
+  Summarize(
+      job, fits, [&](std::size_t n) { return job.check.rows[n]; }, m, summary);
+  summary.worst_total = all.worst_total;
+  summary.unfit_slices = all.unfit;
+}
+
 }  // namespace
 
 void Measure(Job& job, Material& m, FactorSummary& summary) {
+  if (!job.totals.empty()) {
+    MeasureCheck(job, m, summary);
+    return;
+  }
   const std::int64_t points = m.PointCount();
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const double floor = reconstruct::kLogFloor * job.Peak();
@@ -133,18 +213,18 @@ void Measure(Job& job, Material& m, FactorSummary& summary) {
         const FitError error = ErrorOf(rd, valid, values, floor);
         fit.error += error;
         fit.worst_channel = std::max(fit.worst_channel, error.RelativeL2());
-        if (error.signal > 0 && error.model > 0) {
-          fit.worst_total =
-              std::max(fit.worst_total, std::abs(error.model / error.signal - 1));
-        } else if (error.signal != 0 || error.model != 0) {
-          ++fit.unfit;
-        }
+        AddTotal(error.signal, error.model, fit);
       }
     });
   }
   Report(job.progress, {"factor", points, points, "done"});
   ++job.passes;
-  Summarize(job, fits, m, summary);
+  Summarize(
+      job,
+      fits,
+      [](std::size_t n) { return static_cast<std::int64_t>(n); },
+      m,
+      summary);
 }
 
 FitError SampleError(const Job& job, const Material& m) {

@@ -1,8 +1,11 @@
 #include "factor/internal/method.h"
 
 #include "core/random.h"
+#include "factor/internal/block_svd.h"
+#include "factor/internal/log_svd.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace nacre::factor::internal {
 
@@ -26,6 +29,74 @@ Sample TakeSample(SliceSource& source, int wanted, std::uint64_t seed) {
     to.valid.insert(to.valid.end(), block.valid, block.valid + size);
   }
   return sample;
+}
+
+namespace {
+
+// Every n-th of its slices, `wanted` of them.
+Sample Thin(const Sample& from, std::int64_t wanted) {
+  const auto count = static_cast<std::int64_t>(from.rows.size());
+  const std::int64_t kept = std::min(wanted, count);
+  const std::int64_t size = from.dataset.header.SliceSize();
+  Sample thin;
+  thin.dataset.header = from.dataset.header;
+  thin.dataset.header.points_x = static_cast<int>(kept);
+  for (std::int64_t n = 0; n < kept; ++n) {
+    const std::int64_t row = n * count / kept;
+    thin.rows.push_back(from.rows[static_cast<std::size_t>(row)]);
+    const auto add = [&](const auto& values, auto& to) {
+      const auto first = values.begin() + row * size;
+      to.insert(to.end(), first, first + size);
+    };
+    add(from.dataset.rd, thin.dataset.rd);
+    add(from.dataset.valid, thin.dataset.valid);
+  }
+  return thin;
+}
+
+bool OneReadingMayDo(const reconstruct::RdHeader& header,
+                     const FactorOptions& options) {
+  const bool is_svd = options.method == "log-svd" || options.method == "svd" ||
+                      options.method == "sqrt-svd";
+  return is_svd && options.clusters == 1 && options.check_slices > 0 &&
+         !options.one_by_one && BlocksPay(header, options.terms);
+}
+
+bool IsComplete(const reconstruct::RdDataset& dataset) {
+  return std::all_of(dataset.valid.begin(),
+                     dataset.valid.end(),
+                     [](std::uint8_t valid) { return valid != 0; }) &&
+         std::all_of(dataset.rd.begin(), dataset.rd.end(), [](float value) {
+           return std::isfinite(value);
+         });
+}
+
+}  // namespace
+
+void LookAtAll(Job& job) {
+  job.check = {};
+  job.totals.clear();
+  job.sample = TakeSample(job.source, job.options.sample_rows, job.options.seed);
+  job.scans = Scan(job.source, job.options.thread_count);
+  ++job.passes;
+}
+
+void Look(Job& job) {
+  const reconstruct::RdHeader& header = job.source.header();
+  if (OneReadingMayDo(header, job.options)) {
+    job.check = TakeSample(job.source,
+                           std::max(kSvdSampleRows, job.options.check_slices),
+                           job.options.seed);
+    if (IsComplete(job.check.dataset)) {
+      job.sample = Thin(job.check, job.options.sample_rows);
+      job.scans = Scan(*SourceOf(job.check.dataset), job.options.thread_count);
+      for (ChannelScan& scan : job.scans) {
+        scan.used = header.PointCount() * header.WindowSize();
+      }
+      return;
+    }
+  }
+  LookAtAll(job);
 }
 
 double Job::Peak() const {

@@ -34,9 +34,21 @@ struct Job {
   std::vector<ChannelScan> scans;
   int passes = 0;  ///< times that all slices were read
 
+  /// Slices that stand for all where these are read only once, beside which `scans` are
+  /// theirs until a fit has seen all slices and set `totals`; else empty.
+  Sample check = {};
+  std::vector<double> totals = {};  ///< [channel][point] Σ R_d of the slices
+
   /// The largest measurement of any channel, mm⁻².
   double Peak() const;
 };
+
+/// Fills `sample` and `scans`, or, where a method can do with one reading of all slices
+/// (the SVDs, large data, nothing missing), `sample`, `check` and its scans.
+void Look(Job& job);
+
+/// Fills `sample` and `scans` by a reading of all slices; `check` is empty.
+void LookAtAll(Job& job);
 
 /// A way to make maps and kernels of a dataset.
 class Method {

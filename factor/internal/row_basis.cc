@@ -16,10 +16,11 @@ void GramSum::AddPanel(const RowMatrix& y, Eigen::Index first, Eigen::Index coun
   }
 }
 
-RowBasis BasisOf(const GramSum& sum, int terms) {
+RowBasis BasisOf(const GramSum& sum, int terms, bool one_by_one) {
   RowBasis basis;
   basis.rows = sum.rows;
-  LeadingEigen eigen = ComputeLeadingEigen(sum.gram, terms);
+  LeadingEigen eigen =
+      one_by_one ? DeflateEigen(sum.gram, terms) : ComputeLeadingEigen(sum.gram, terms);
   basis.vectors = std::move(eigen.vectors);
   MakeSignsCanonical(basis.vectors);
   basis.sigma = eigen.values.cwiseSqrt();

@@ -46,6 +46,7 @@ struct RowBasis {
                                      std::span<const std::uint8_t> valid) const;
 };
 
-RowBasis BasisOf(const GramSum& sum, int terms);
+/// `one_by_one`: each vector from the residual of those before.
+RowBasis BasisOf(const GramSum& sum, int terms, bool one_by_one = false);
 
 }  // namespace nacre::factor::internal

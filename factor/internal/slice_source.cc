@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <future>
+#include <utility>
 
 namespace nacre::factor::internal {
 namespace {
@@ -36,6 +38,7 @@ class MemorySource : public SliceSource {
             &dataset_.valid[offset],
             dataset_.sigma.empty() ? nullptr : &dataset_.sigma[offset]};
   }
+  bool in_memory() const override { return true; }
 
  private:
   const reconstruct::RdDataset& dataset_;
@@ -48,27 +51,54 @@ class FileSource : public SliceSource {
   const RdHeader& header() const override { return reader_.header(); }
 
   SliceBlock Read(std::int64_t first, std::int64_t count) override {
-    const std::int64_t size = header().SliceSize();
-    rd_.resize(static_cast<std::size_t>(count * size));
-    valid_.resize(rd_.size());
-    sigma_.resize(rd_.size());
-    for (std::int64_t s = 0; s < count; ++s) {
-      const std::int64_t slice_index = first + s;
-      const reconstruct::RdSlice slice =
-          reader_.ReadSlice(static_cast<int>(slice_index % header().points_x),
-                            static_cast<int>(slice_index / header().points_x));
-      std::copy(slice.rd.begin(), slice.rd.end(), rd_.begin() + s * size);
-      std::copy(slice.valid.begin(), slice.valid.end(), valid_.begin() + s * size);
-      std::copy(slice.sigma.begin(), slice.sigma.end(), sigma_.begin() + s * size);
+    if (ahead_.valid()) {
+      ahead_.get();
+      std::swap(now_, next_);
     }
-    return {first, count, rd_.data(), valid_.data(), sigma_.data()};
+    if (now_.first != first || now_.count != count) {
+      Load(first, count, now_);
+    }
+    const std::int64_t end = first + count;
+    if (count > 1 && end < header().PointCount()) {
+      ahead_ = std::async(std::launch::async, [this, end, count] {
+        Load(end, std::min(count, header().PointCount() - end), next_);
+      });
+    }
+    return {first, count, now_.rd.data(), now_.valid.data(), now_.sigma.data()};
   }
 
  private:
+  struct Block {
+    std::int64_t first = 0;
+    std::int64_t count = 0;
+    std::vector<float> rd;
+    std::vector<std::uint8_t> valid;
+    std::vector<float> sigma;
+  };
+
+  void Load(std::int64_t first, std::int64_t count, Block& block) {
+    const std::int64_t size = header().SliceSize();
+    block.count = 0;  // nothing, should reading fail
+    block.rd.resize(static_cast<std::size_t>(count * size));
+    block.valid.resize(block.rd.size());
+    block.sigma.resize(block.rd.size());
+    for (std::int64_t s = 0; s < count; ++s) {
+      const std::int64_t n = first + s;
+      const reconstruct::RdSlice slice =
+          reader_.ReadSlice(static_cast<int>(n % header().points_x),
+                            static_cast<int>(n / header().points_x));
+      std::copy(slice.rd.begin(), slice.rd.end(), block.rd.begin() + s * size);
+      std::copy(slice.valid.begin(), slice.valid.end(), block.valid.begin() + s * size);
+      std::copy(slice.sigma.begin(), slice.sigma.end(), block.sigma.begin() + s * size);
+    }
+    block.first = first;
+    block.count = count;
+  }
+
   reconstruct::RdReader& reader_;
-  std::vector<float> rd_;
-  std::vector<std::uint8_t> valid_;
-  std::vector<float> sigma_;
+  Block now_;
+  Block next_;
+  std::future<void> ahead_;  // last: it is waited for before the blocks go
 };
 
 }  // namespace

@@ -24,12 +24,16 @@ class SliceSource {
   virtual const reconstruct::RdHeader& header() const = 0;
   /// The block stays valid until the next call.
   virtual SliceBlock Read(std::int64_t first, std::int64_t count) = 0;
+  /// Whether reading costs next to nothing.
+  virtual bool in_memory() const { return false; }
 };
 
 /// Slices of a dataset in memory. Throws BadData naming the value if a size is wrong.
 std::unique_ptr<SliceSource> SourceOf(const reconstruct::RdDataset& dataset);
 
-/// Slices of a file: one block in memory, every pass reads the file again.
+/// Slices of a file: every pass reads the file again, on a thread of its own one block
+/// ahead of what was asked for last, so that two are in memory. Between a block and the
+/// last one of the file nobody else may use `reader`.
 std::unique_ptr<SliceSource> SourceOf(reconstruct::RdReader& reader);
 
 }  // namespace nacre::factor::internal

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <limits>
 
 namespace nacre::factor::internal {
 namespace {
@@ -29,6 +30,9 @@ RowMatrix FilledRows(const reconstruct::RdDataset& sample,
   return rows;
 }
 
+// Of −c: values below it would leave nothing of the logarithm's argument.
+constexpr double kLeastOffset = -0.9;
+
 class SvdMethod final : public Method {
  public:
   explicit SvdMethod(Job& job) : job_(job) {
@@ -45,16 +49,9 @@ class SvdMethod final : public Method {
       model_.cluster_count = clustering.cluster_count;
       ++job.passes;
     }
-    ChooseTransforms();
-    FitSvd(job.source,
-           {.terms = job.options.terms,
-            .cluster_count = model_.cluster_count,
-            .fill_rounds = job.options.fill_rounds,
-            .seed = job.options.seed,
-            .thread_count = job.options.thread_count},
-           model_,
-           job.progress);
-    job.passes += model_.passes;
+    if (job.check.rows.empty() || !FitInOneReading()) {
+      Fit(nullptr);
+    }
     curve_ = ErrorCurve(job, model_, MostTerms());
   }
 
@@ -90,7 +87,52 @@ class SvdMethod final : public Method {
   }
 
  private:
+  void Fit(RowScans* rows) {
+    ChooseTransforms();
+    FitSvd(job_.source,
+           {.terms = job_.options.terms,
+            .cluster_count = model_.cluster_count,
+            .fill_rounds = job_.options.fill_rounds,
+            .one_by_one = job_.options.one_by_one,
+            .seed = job_.options.seed,
+            .thread_count = job_.options.thread_count,
+            .sample = rows != nullptr ? &job_.check : nullptr,
+            .rows = rows},
+           model_,
+           job_.progress);
+    job_.passes += model_.passes;
+    model_.passes = 0;
+  }
+
+  // A and B are those of the sample, and all is scanned by the pass that fits. Returns
+  // false, with all slices looked at, if these aren't what the sample promised.
+  bool FitInOneReading() {
+    RowScans rows(model_.scans.size(), job_.source.header().PointCount());
+    Fit(&rows);
+    bool regular = !model_.scores.empty();  // or the fit took another way
+    for (std::size_t c = 0; c < model_.scans.size(); ++c) {
+      const RowTransform& t = model_.transforms[c];
+      constexpr double kAny = -std::numeric_limits<double>::infinity();
+      regular =
+          regular && rows.AreRegular(c, t.is_log ? kLeastOffset * t.a * t.b : kAny);
+    }
+    if (!regular) {
+      LookAtAll(job_);
+      model_.scans = job_.scans;
+      model_.bases.clear();
+      model_.scores.clear();
+      return false;
+    }
+    for (std::size_t c = 0; c < model_.scans.size(); ++c) {
+      rows.Store(c, job_.source.header().WindowSize(), model_.scans[c]);
+    }
+    job_.scans = model_.scans;
+    job_.totals = std::move(rows.total);
+    return true;
+  }
+
   void ChooseTransforms() {
+    search_steps_ = 0;
     const std::size_t channels = model_.scans.size();
     model_.transforms.assign(channels, {});
     std::vector<int> steps(channels, 0);

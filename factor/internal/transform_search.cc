@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <numbers>
 
 namespace nacre::factor::internal {
@@ -101,6 +102,9 @@ double TransformObjective(const RowMatrix& rd,
   RowMatrix model = svd.scores * svd.basis.transpose();
   // exp of an extrapolated logarithm overflows; nothing real lies above 3 peaks.
   const double ceiling = transform.Forward(3 * search.peak);
+  // Logarithms take half the time.
+  const double floor = search.log_weight > 0 ? reconstruct::kLogFloor * search.peak
+                                             : std::numeric_limits<double>::infinity();
   FitError error;
   for (Eigen::Index row = 0; row < model.rows(); ++row) {
     auto values = model.row(row);
@@ -113,10 +117,11 @@ double TransformObjective(const RowMatrix& rd,
       values *= wanted / total;
     }
     for (Eigen::Index cell = 0; cell < model.cols(); ++cell) {
-      error.Add(rd(row, cell), values(cell), reconstruct::kLogFloor * search.peak);
+      error.Add(rd(row, cell), values(cell), floor);
     }
   }
-  return error.RelativeL2() + search.log_weight * error.LogRms();
+  return error.RelativeL2() +
+         (search.log_weight > 0 ? search.log_weight * error.LogRms() : 0);
 }
 
 TransformChoice ChooseTransform(const RowMatrix& rd, const TransformSearch& search) {

@@ -63,6 +63,29 @@ LeadingEigen ComputeLeadingEigen(const Eigen::MatrixXd& gram,
   return result;
 }
 
+LeadingEigen DeflateEigen(const Eigen::MatrixXd& gram, int count) {
+  LeadingEigen result{Eigen::VectorXd(0), Eigen::MatrixXd(gram.rows(), 0)};
+  Eigen::MatrixXd left = gram.selfadjointView<Eigen::Lower>();
+  while (result.values.size() < count) {
+    const LeadingEigen next = ComputeLeadingEigen(left, 1);
+    const Eigen::Index n = result.values.size();
+    if (next.values.size() == 0 ||
+        (n > 0 &&
+         next.values(0) <= kRankTolerance * kRankTolerance * result.values(0))) {
+      break;
+    }
+    const Eigen::VectorXd v = next.vectors.col(0);
+    result.values.conservativeResize(n + 1);
+    result.values(n) = next.values(0);
+    result.vectors.conservativeResize(Eigen::NoChange, n + 1);
+    result.vectors.col(n) = v;
+    // The residual Y (1 − v vᵀ), by its Gram matrix.
+    left -= v * (v.transpose() * left);
+    left -= (left * v) * v.transpose();
+  }
+  return result;
+}
+
 TruncatedSvd ComputeTruncatedSvd(const RowMatrix& y, int terms, double tolerance) {
   const Eigen::Index side = std::min(y.rows(), y.cols());
   const bool wide = y.rows() < y.cols();

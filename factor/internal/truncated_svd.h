@@ -22,6 +22,10 @@ LeadingEigen ComputeLeadingEigen(const Eigen::MatrixXd& gram,
                                  int count,
                                  double tolerance = 1e-13);
 
+/// The same one after the other, each from what is left of G without those before: for
+/// G = YᵀY, the thesis' loop over the residual Y − Σ f_j h_jᵀ [Oenel14, sec. 4.3].
+LeadingEigen DeflateEigen(const Eigen::MatrixXd& gram, int count);
+
 /// Singular values below this fraction of the largest are taken for zero: measurements
 /// are 32-bit floats, so smaller ones hold their rounding only.
 inline constexpr double kRankTolerance = 1e-7;
