@@ -226,6 +226,10 @@ ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
   data.pairs = {std::vector<float>(held, 0.0F), std::vector<float>(held, -1.0F)};
   data.stride = std::max<std::size_t>(
       1, data.Plane() / static_cast<std::size_t>(limits.sample_pairs));
+  // A common divisor would leave out whole columns.
+  while (std::gcd(data.stride, static_cast<std::size_t>(data.width)) > 1) {
+    --data.stride;
+  }
   data.sample_size = data.Plane() / data.stride + 1;
   if (!data.HoldsAll()) {
     const std::size_t size = data.channels * data.cells * data.sample_size;
