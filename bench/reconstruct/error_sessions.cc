@@ -86,8 +86,8 @@ std::string NameOf(const ErrorSession& session) {
   return name;
 }
 
-std::string PhantomText(const ErrorSession& session) {
-  const acquire::RigDescription rig = acquire::ReadRig(session.rig);
+std::string PhantomText(const ErrorSession& session,
+                        const acquire::RigDescription& rig) {
   for (const Sample& sample : kSamples) {
     if (session.phantom == sample.name) {
       return fmt::format(
@@ -127,8 +127,9 @@ std::vector<std::string> ErrorPhantoms() {
 std::filesystem::path CaptureErrorSession(const ErrorSession& session) {
   const std::filesystem::path folder = session.folder / NameOf(session);
   std::filesystem::create_directories(folder);
-  WriteFile(folder / "phantom.toml", PhantomText(session));
   WriteFile(folder / "rig.toml", RigText(session));
+  WriteFile(folder / "phantom.toml",
+            PhantomText(session, acquire::ReadRig(folder / "rig.toml")));
   if (std::filesystem::exists(folder / "session" / "session.json") &&
       acquire::SessionReader(folder / "session").IsComplete()) {
     return folder;
