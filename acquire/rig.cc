@@ -211,18 +211,21 @@ ScannerDescription ReadScanner(const TomlTable& table) {
 }
 
 ScheduleDescription ReadSchedule(const std::optional<TomlTable>& table, int core) {
-  // Windows of 1.0 core would just not overlap; 1.4 leaves light from the neighbour's
-  // spot at the edge of a window two thirds of a core of further decay.
+  // At 1.0 core windows just don't overlap; 1.4 leaves light from the neighbour's spot
+  // at the edge of a window two thirds of a core of further decay. Below 1.0 the
+  // reconstruction parts what windows share.
   ScheduleDescription schedule;
   schedule.spot_spacing_cells = static_cast<int>(std::ceil(1.4 * core));
   if (table) {
     schedule.spot_spacing_cells = table->Integer(
         "spot_spacing_cells", schedule.spot_spacing_cells, Range{1, 8192});
-    if (schedule.spot_spacing_cells < core) {
+    const int least = core / 2 + 1;
+    if (schedule.spot_spacing_cells < least) {
       throw table->At("spot_spacing_cells",
-                      fmt::format("{} is less than core = {}: the windows of two spots "
-                                  "of one picture would overlap",
+                      fmt::format("{} is less than {}: spots would light the middle of "
+                                  "each other's windows (core = {})",
                                   schedule.spot_spacing_cells,
+                                  least,
                                   core));
     }
     schedule.order_seed =

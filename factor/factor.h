@@ -85,12 +85,13 @@ struct FactorOptions {
           Range{},
           "of the SVDs: each term from the residual of those before, as the thesis has "
           "it; the same to rounding, and slower");
-    visit("check_slices",
-          self.check_slices,
-          Range{0, 1e9},
-          "of the SVDs on 8192 slices and more: errors are measured on so many (at "
-          "least 4096), with one reading of the data for all; 0: on all of them, by two "
-          "more");
+    visit(
+        "check_slices",
+        self.check_slices,
+        Range{0, 1e9},
+        "of the SVDs on 8192 slices and more: errors are measured on so many (at "
+        "least 4096), with one reading of the data for all; 0: on all of them, by two "
+        "more");
     visit("polynomial",
           self.polynomial,
           Range{0, 8},
@@ -104,11 +105,12 @@ struct FactorOptions {
           Range{1, 4},
           "of reciprocal, where maps are looked at between two points: 1 at the points "
           "alone, 2 in the middle, 3 at the quarters, 4 at the eighths too");
-    visit("sides",
-          self.sides,
-          Range{0, 1},
-          "of reciprocal: 1 has a map for how light that enters at a point differs from "
-          "light that leaves from a cell; R_d without it is the same both ways");
+    visit(
+        "sides",
+        self.sides,
+        Range{0, 1},
+        "of reciprocal: 1 has a map for how light that enters at a point differs from "
+        "light that leaves from a cell; R_d without it is the same both ways");
     visit("totals",
           self.totals,
           Range{0, 1},
@@ -143,7 +145,7 @@ struct FactorSummary {
   double psnr_db = 0;         ///< 20 log10(peak / RMSE)
   double peak = 0;            ///< largest measurement, mm⁻²
   std::int64_t measured_slices = 0;  ///< that errors are of: all, or a sample
-  double worst_slice = 0;     ///< largest relative L2 error of these
+  double worst_slice = 0;            ///< largest relative L2 error of these
   int worst_slice_i = 0;
   int worst_slice_j = 0;
   double worst_total =

@@ -21,12 +21,14 @@ class Texture {
 };
 using TexturePtr = std::shared_ptr<const Texture>;
 
-/// uv' = uv · scale + offset, before the lookup.
+/// uv' = u · along_u + v · along_v + offset, before the lookup.
 struct UvMap {
-  Vec2 scale{1, 1};
+  Vec2 along_u{1, 0};
+  Vec2 along_v{0, 1};
   Vec2 offset{0, 0};
   Vec2 operator()(Vec2 uv) const {
-    return {uv.x * scale.x + offset.x, uv.y * scale.y + offset.y};
+    return {uv.x * along_u.x + uv.y * along_v.x + offset.x,
+            uv.x * along_u.y + uv.y * along_v.y + offset.y};
   }
 };
 

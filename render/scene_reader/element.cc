@@ -181,8 +181,8 @@ Vec3 Element::Point(const char* name, Vec3 otherwise) {
   return {axis("x"), axis("y"), axis("z")};
 }
 
-Transform Element::ToWorld() {
-  const pugi::xml_node node = FindValue("toWorld", {"transform"});
+Transform Element::TransformOf(const char* name) {
+  const pugi::xml_node node = FindValue(name, {"transform"});
   return node ? ParseTransform(*document_, node) : Transform();
 }
 

@@ -31,7 +31,8 @@ class Element {
   Color Spectrum(const char* name, Color otherwise);
   Vec3 Point(const char* name, Vec3 otherwise);
   /// The identity if it isn't there.
-  Transform ToWorld();
+  Transform ToWorld() { return TransformOf("toWorld"); }
+  Transform TransformOf(const char* name);
   /// A texture, a colour, or a reference to a texture.
   TexturePtr TextureOr(const char* name, Color otherwise);
   /// As TextureOr, and an error unless all values are in [0, 1].

@@ -9,12 +9,19 @@
 namespace nacre::render {
 namespace {
 
+// `toUV` first, then Mitsuba 0.6's scales and offsets.
 UvMap ReadUvMap(Element& element) {
+  const Transform to_uv = element.TransformOf("toUV");
+  const auto scale_u = static_cast<float>(element.Float("uscale", 1));
+  const auto scale_v = static_cast<float>(element.Float("vscale", 1));
+  const Vec3 u = to_uv.Vector({1, 0, 0});
+  const Vec3 v = to_uv.Vector({0, 1, 0});
+  const Vec3 origin = to_uv.Point({0, 0, 0});
   UvMap map;
-  map.scale = {static_cast<float>(element.Float("uscale", 1)),
-               static_cast<float>(element.Float("vscale", 1))};
-  map.offset = {static_cast<float>(element.Float("uoffset", 0)),
-                static_cast<float>(element.Float("voffset", 0))};
+  map.along_u = {u.x * scale_u, u.y * scale_v};
+  map.along_v = {v.x * scale_u, v.y * scale_v};
+  map.offset = {origin.x * scale_u + static_cast<float>(element.Float("uoffset", 0)),
+                origin.y * scale_v + static_cast<float>(element.Float("voffset", 0))};
   return map;
 }
 

@@ -175,7 +175,9 @@ INSTANTIATE_TEST_SUITE_P(
         BadRig{"reflectance = 0.99", "reflectance = 1.5", "1.5 is outside"},
         BadRig{"[\"R\", \"G\"]", "[\"R\", \"R\"]", "different, non-empty"},
         BadRig{"mm_per_rad = 300", "mm_per_rad = true", "expected a number"},
-        BadRig{"spacing_cells = 4", "spacing_cells = 2", "would overlap"},
+        BadRig{"spacing_cells = 4",
+               "spacing_cells = 1",
+               "1 is less than 2: spots would light"},
         BadRig{"[schedule]", "[plan]", "rig.toml:32: plan: unknown here"},
         BadRig{"kind = ", "kind ", "rig.toml:1:"}));
 

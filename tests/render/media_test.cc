@@ -98,9 +98,9 @@ TEST(MediaTest, WhiteFurnace) {
   }
 }
 
-// [van de Hulst 80, table 35; quoted in Wang95]: optical thickness 2, albedo 0.9, g 0.75, index 1:
-// R = 0.09739, T = 0.66096 for light along the normal. By reciprocity that is what an
-// eye along the normal sees of a slab under an even sky, above and below it.
+// [van de Hulst 80, volume 2, table 35]: optical thickness 2, albedo 0.9, g 0.75, index
+// 1: R = 0.09739, T = 0.66096 for light along the normal. By reciprocity that is what
+// an eye along the normal sees of a slab under an even sky, above and below it.
 TEST(MediaTest, SlabReflectsAndTransmitsAsPublished) {
   const auto scene = [](const std::string& lamp_z, const std::string& turn) {
     return R"(<shape type="rectangle"><emitter type="area"><rgb name="radiance" value="1"/>

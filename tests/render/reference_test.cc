@@ -127,7 +127,8 @@ TEST(SeenPlacesTest, DistancesAreThoseToWhatWasSeen) {
     places.push_back(p);
   }
   // What is blurred needs no close look.
-  seen.At(SpherePoint(scene.shapes[0], {0, 0, -1}), {sampler, counters, Sight::kBlurred});
+  seen.At(SpherePoint(scene.shapes[0], {0, 0, -1}),
+          {sampler, counters, Sight::kBlurred});
   seen.Finish();
   EXPECT_EQ(seen.seen_count(), 3);
   const AreaSampler area(scene.shapes[0]);
@@ -208,7 +209,8 @@ TEST(LazyTest, AreaIsKeptWhateverIsLeftOut) {
   SeenPlaces seen(scene.shapes[0]);
   Sampler sampler(1, 0);
   PathCounters counters;
-  seen.At(MeshPoint(scene.shapes[0], 0, {0.1F, 0.1F}), {sampler, counters, Sight::kSharp});
+  seen.At(MeshPoint(scene.shapes[0], 0, {0.1F, 0.1F}),
+          {sampler, counters, Sight::kSharp});
   seen.Finish();
   const World world(scene, 1);
   const ExitanceSources dark(1);

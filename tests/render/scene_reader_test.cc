@@ -194,7 +194,8 @@ TEST(SceneReaderTest, UnknownWordsAreErrorsWithTheLineAndTheNearestWord) {
        "no element <floatt>; did you mean 'float'?"},
       {"<shape type=\"cube\"><film type=\"hdrfilm\"/></shape>",
        "a <film> has no place in a <shape>"},
-      {"<integrator type=\"bdpt\"/>", "no integrator 'bdpt'; known are path, direct"},
+      {"<integrator type=\"bdpt\"/>",
+       "no integrator 'bdpt'; known are path, volpath, volpath_simple, direct"},
       {"<shape type=\"cube\"><transform name=\"toWorld\"><rotat x=\"1\"/></transform>"
        "</shape>",
        "no transform <rotat>; did you mean 'rotate'?"},
@@ -335,7 +336,7 @@ TEST(SceneReaderTest, EveryCutOffSceneIsRefused) {
 
 TEST(SceneReaderTest, LenientTurnsUnknownWordsIntoNotes) {
   const Scene scene = Parse(SceneText(R"(
-  <medium type="homogeneous" id="m"/>
+  <fog type="homogeneous" id="m"/>
   <shape type="sphere"><float name="radious" value="1"/><bsdf type="phong"/></shape>
   <shape type="hair"/>)"),
                             {.lenient = true});
@@ -344,7 +345,7 @@ TEST(SceneReaderTest, LenientTurnsUnknownWordsIntoNotes) {
   EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("'radious'")));
   EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("no bsdf 'phong'")));
   EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("no shape 'hair'")));
-  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("<medium>")));
+  EXPECT_THAT(scene.notes, ::testing::Contains(HasSubstr("<fog>")));
   // A wrong value stays an error.
   EXPECT_THAT(ReaderError(SceneText("<shape type=\"sphere\"><float name=\"radius\" "
                                     "value=\"x\"/></shape>"),

@@ -1,4 +1,5 @@
 // Scenes of several files, and shapes that are there several times.
+#include "render/warp.h"
 #include "tests/render/scene_text.h"
 #include "tests/support/temp_folder.h"
 
@@ -9,8 +10,8 @@
 namespace nacre::render::testing {
 namespace {
 
-using ::testing::HasSubstr;
 using nacre::testing::TempFolder;
+using ::testing::HasSubstr;
 
 class IncludeTest : public ::testing::Test {
  protected:
@@ -66,6 +67,22 @@ TEST_F(IncludeTest, RefusesCyclesLongChainsAndASecondSensor) {
   Write("view.xml", "<scene><sensor type=\"perspective\"/></scene>");
   Write("main.xml", SceneText("<include filename=\"view.xml\"/>"));
   EXPECT_THAT(ErrorOf("main.xml"), HasSubstr("view.xml:1: a second <sensor>"));
+}
+
+// A quarter turn takes (u, v) to (−v, u), then u is doubled.
+TEST(TextureTransformTest, TurnsBeforeItScales) {
+  const Scene scene = Parse(SceneText(R"(<shape type="cube"><bsdf type="diffuse">
+    <texture type="checkerboard" name="reflectance"><rgb name="color0" value="1"/>
+    <rgb name="color1" value="0"/><float name="uscale" value="2"/>
+    <transform name="toUV"><rotate z="1" angle="90"/></transform></texture>
+    </bsdf></shape>)"));
+  const auto reflectance = [&](Vec2 uv) {
+    return scene.shapes[0].bsdf->Evaluate({0, 0, 1}, {0, 0, 1}, uv).value.x * kPi;
+  };
+  // ⌊2u'⌋ + ⌊2v'⌋ with u' = −2v, v' = u.
+  EXPECT_NEAR(reflectance({0.2F, 0.1F}), 0, 1e-6);  // −1 + 0
+  EXPECT_NEAR(reflectance({0.2F, 0.3F}), 1, 1e-6);  // −2 + 0
+  EXPECT_NEAR(reflectance({0.7F, 0.1F}), 1, 1e-6);  // −1 + 1
 }
 
 const char* const kLamp = R"(<emitter type="point">

@@ -50,7 +50,7 @@ TEST(TextureTest, WrapsAsAsked) {
 }
 
 TEST(TextureTest, ScalesAndShiftsBeforeTheLookup) {
-  const UvMap map{.scale = {2, 1}, .offset = {0.5F, 0}};
+  const UvMap map{.along_u = {2, 0}, .offset = {0.5F, 0}};
   const TexturePtr texture = MakeBitmap(Numbered(), {.map = map, .nearest = true});
   EXPECT_EQ(texture->At({0.1F, 0.9F}).x, 2);  // u' = 0.7
   EXPECT_EQ(texture->At({0.3F, 0.9F}).x, 1);  // u' = 1.1

@@ -113,7 +113,7 @@ TEST_F(Export, MitsubaGetsTheMeanAsAMedium) {
 
 TEST_F(Export, RefusesWhatItDoesntKnow) {
   EXPECT_THAT(testing::ErrorMessage([&] { To("arnold"); }, ExitCode::kUsage),
-              HasSubstr("psf, cycles, pbrt-v4"));
+              HasSubstr("psf, sss, cycles, pbrt-v4"));
 }
 
 }  // namespace
