@@ -72,6 +72,7 @@ std::function<int()> MakeFactorVerb(CLI::App& app, const Common& common) {
   app.add_option("dataset", arguments->dataset, "R_d, *.rd.exr")->required();
   app.add_option("--out", arguments->out, "the material, *.nacre.exr")->required();
   AddOptions(app, arguments->options);
+  app.get_option("--bytes")->transform(CLI::AsSizeValue(true));  // 300k, 2MB
   return [arguments, &common] { return Run(*arguments, common); };
 }
 

@@ -53,7 +53,7 @@ struct FactorOptions {
     visit("bytes",
           self.bytes,
           Range{0},
-          "fewer terms, for a file of this size at most; 0: no limit");
+          "fewer terms, for a file of this size at most (300k, 2MB); 0: no limit");
     visit("error",
           self.error,
           Range{0, 1},
