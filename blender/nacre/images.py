@@ -23,9 +23,23 @@ def _png(path, pixels):
         file.write(chunk(b"IDAT", zlib.compress(raw, 6)) + chunk(b"IEND", b""))
 
 
+def _exr(path, pixels):
+    height, width = pixels.shape[:2]
+    image = bpy.data.images.new("nacre", width, height, alpha=True, float_buffer=True)
+    try:
+        image.colorspace_settings.name = "Non-Color"  # the numbers as they are
+        image.pixels.foreach_set(np.dstack(
+            [pixels[:, :, :3], np.ones((height, width), dtype=np.float32)]).ravel())
+        image.filepath_raw = path
+        image.file_format = "OPEN_EXR"
+        image.save()
+    finally:
+        bpy.data.images.remove(image)
+
+
 def file_of(image, folder):
     """The path of a file with the image's pixels: its own if the renderer reads that, else a
-    PNG in `folder`. Raises ValueError if it has no pixels."""
+    file in `folder`: EXR if they are floats, or PNG. Raises ValueError if it has none."""
     own = bpy.path.abspath(image.filepath, library=image.library) if image.filepath else ""
     plain = image.source == "FILE" and not image.packed_file and not image.is_dirty
     if plain and own.lower().endswith((".png", ".exr")) and os.path.isfile(own):
@@ -38,6 +52,9 @@ def file_of(image, folder):
     pixels = pixels.reshape(height, width, image.channels)
     if image.channels < 3:
         pixels = np.repeat(pixels[:, :, :1], 3, axis=2)
-    path = os.path.join(folder, bpy.path.clean_name(image.name_full) + ".png")
-    _png(path, pixels)
-    return path
+    stem = os.path.join(folder, bpy.path.clean_name(image.name_full))
+    if image.is_float:
+        _exr(stem + ".exr", pixels)
+        return stem + ".exr"
+    _png(stem + ".png", pixels)
+    return stem + ".png"

@@ -4,10 +4,12 @@ import math
 
 from mathutils import Matrix
 
-from . import log, xml
+from . import images, log, xml
 
 # A lamp or a camera looks along -z; the renderer's along +z, with x to the left.
 TURN = Matrix.Diagonal((-1.0, 1.0, -1.0, 1.0))
+# The middle of Blender's pictures of surroundings is +x, their top +z; here +z and +y.
+SURROUNDINGS = Matrix(((0, 0, 1, 0), (1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0, 1)))
 
 
 def _rigid(matrix):
@@ -87,23 +89,60 @@ def lamp(data, matrix):
     return makers[data.type](data, matrix)
 
 
-def _background(world):
-    if not world.use_nodes or world.node_tree is None:
-        return world.color, 1.0
-    for node in world.node_tree.nodes:
-        if node.type == "BACKGROUND":
-            if node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
-                log.warn("%s: pictures of surroundings aren't translated; one colour is used"
-                         % world.name)
-            return node.inputs["Color"].default_value, node.inputs["Strength"].default_value
-    return (0, 0, 0), 0.0
+def _turn(texture):
+    """The rotation by which a Mapping node turns directions before they are looked up."""
+    socket = texture.inputs["Vector"]
+    if not socket.is_linked:
+        return Matrix()
+    node = socket.links[0].from_node
+    if node.type != "MAPPING":
+        return Matrix()
+    if any(abs(a) > 1e-6 for a in node.inputs["Location"].default_value) or any(
+            abs(a - 1) > 1e-6 for a in node.inputs["Scale"].default_value):
+        log.warn("surroundings that are moved or scaled aren't translated, only turned ones")
+    return node.inputs["Rotation"].default_value.to_matrix().to_4x4()
 
 
-def world(data):
+def _picture(world, texture, strength, folder):
+    """A picture of surroundings, or None if it can't be had."""
+    if texture.image is None or texture.projection != "EQUIRECTANGULAR":
+        log.warn("%s: only equirectangular pictures of surroundings are translated" % world.name)
+        return None
+    try:
+        path = images.file_of(texture.image, folder)
+    except (ValueError, OSError, RuntimeError) as error:
+        log.warn("%s: %s" % (world.name, error))
+        return None
+    return xml.element("emitter", [
+        xml.string("filename", path), xml.number("scale", strength),
+        xml.transform("toWorld", _turn(texture).inverted() @ SURROUNDINGS),
+    ], type="envmap")
+
+
+def world(data, folder):
     """The surroundings' element, or None if they are black."""
     if data is None:
         return None
-    color, strength = _background(data)
+    if not data.use_nodes or data.node_tree is None:
+        return _even(data.color, 1.0)
+    node = next((n for n in data.node_tree.nodes if n.type == "BACKGROUND"), None)
+    if node is None:
+        return None
+    color, strength = node.inputs["Color"], node.inputs["Strength"]
+    if strength.is_linked:
+        log.warn("%s: what is linked to its strength isn't translated" % data.name)
+    if color.is_linked:
+        texture = color.links[0].from_node
+        if texture.type == "TEX_ENVIRONMENT":
+            picture = _picture(data, texture, strength.default_value, folder)
+            if picture is not None:
+                return picture
+        else:
+            log.warn("%s: %s isn't translated; one colour is used" % (data.name, texture.bl_label))
+    return _even(color.default_value, strength.default_value)
+
+
+def _even(color, strength):
     radiance = [strength * c for c in list(color)[:3]]
     if max(radiance) <= 0:
         return None

@@ -3,6 +3,7 @@
 import os
 
 import bpy
+from mathutils import Matrix
 
 from . import images, log, presets, xml
 
@@ -42,17 +43,24 @@ def _value(node, default, *names):
     return socket.default_value
 
 
-def _uv_scale(node):
-    """Scale and offset of a texture node's coordinates by a Mapping node."""
+def _uv_transform(node):
+    """What a Mapping node does to a texture's coordinates: scaled, turned, moved."""
     mapping = _source(node.inputs["Vector"]) if "Vector" in node.inputs else None
     if mapping is None or mapping.type != "MAPPING":
         return []
+    if mapping.vector_type != "POINT":
+        log.warn("%s: a Mapping node of type %s isn't translated"
+                 % (node.id_data.name, mapping.vector_type.lower()))
+        return []
+    turn = mapping.inputs["Rotation"].default_value
+    if abs(turn[0]) > 1e-6 or abs(turn[1]) > 1e-6:
+        log.warn("%s: texture coordinates turned about x or y aren't translated"
+                 % node.id_data.name)
     scale = mapping.inputs["Scale"].default_value
     offset = mapping.inputs["Location"].default_value
-    if any(abs(angle) > 1e-6 for angle in mapping.inputs["Rotation"].default_value):
-        log.warn("%s: turned texture coordinates aren't translated" % node.id_data.name)
-    return [xml.number("uscale", scale[0]), xml.number("vscale", scale[1]),
-            xml.number("uoffset", offset[0]), xml.number("voffset", offset[1])]
+    matrix = Matrix.Rotation(turn[2], 4, "Z") @ Matrix.Diagonal((scale[0], scale[1], 1, 1))
+    matrix.translation = (offset[0], offset[1], 0)
+    return [xml.transform("toUV", matrix)]
 
 
 def color(parameter, node, folder, *names):
@@ -69,7 +77,7 @@ def color(parameter, node, folder, *names):
         except (ValueError, OSError, RuntimeError) as error:
             log.warn("%s: %s; grey is used" % (node.id_data.name, error))
             return xml.rgb(parameter, GREY)
-        children = [xml.string("filename", path)] + _uv_scale(texture)
+        children = [xml.string("filename", path)] + _uv_transform(texture)
         space = texture.image.colorspace_settings.name
         if path.endswith(".png") and space in ("Non-Color", "Raw", "Linear", "Linear Rec.709"):
             children.append(xml.number("gamma", 1))
@@ -80,7 +88,7 @@ def color(parameter, node, folder, *names):
         return xml.element("texture", [
             xml.rgb("color0", texture.inputs["Color1"].default_value),
             xml.rgb("color1", texture.inputs["Color2"].default_value),
-            xml.number("uscale", scale), xml.number("vscale", scale),
+            xml.number("uscale", scale), xml.number("vscale", scale), *_uv_transform(texture),
         ], type="checkerboard", name=parameter)
     if texture.type == "RGB":
         return xml.rgb(parameter, texture.outputs[0].default_value)
@@ -132,12 +140,16 @@ def _principled(node, folder):
     return _twosided(_coat(diffuse, roughness, _value(node, 1.5, "IOR")))
 
 
+def _boundary(ior, roughness):
+    kind = "dielectric" if roughness < 0.02 else "roughdielectric"
+    children = [xml.number("intIOR", max(1.001, ior)), xml.number("extIOR", 1)]
+    if kind == "roughdielectric":
+        children += [xml.string("distribution", "ggx"), _alpha(roughness)]
+    return xml.element("bsdf", children, type=kind)
+
+
 def _glass(node):
-    if _value(node, 0.0, "Roughness") > 0.05:
-        log.warn("%s: rough glass is drawn smooth" % node.id_data.name)
-    return xml.element("bsdf", [
-        xml.number("intIOR", max(1.001, _value(node, 1.45, "IOR"))), xml.number("extIOR", 1),
-    ], type="dielectric")
+    return _boundary(_value(node, 1.45, "IOR"), _value(node, 0.0, "Roughness"))
 
 
 def _surface(node, folder):
@@ -195,14 +207,25 @@ def measured_file(settings):
     return os.path.join(preset["folder"], preset["files"]["material"])
 
 
+def _medium(settings):
+    """A medium behind a boundary of glass; of index 1, without one."""
+    inside = xml.element("medium", [
+        xml.rgb("sigmaS", settings.sigma_s), xml.rgb("sigmaA", settings.sigma_a),
+        xml.number("scale", settings.mm_per_unit),
+        xml.element("phase", [xml.number("g", settings.anisotropy)], type="hg"),
+    ], type="homogeneous", name="interior")
+    if settings.ior < 1.001:
+        return [inside]
+    return [_boundary(settings.ior, settings.roughness), inside]
+
+
 def _translucent(material):
     settings = material.nacre
     if settings.model == "MEDIUM":
-        log.warn("%s: the renderer has no participating media yet: the dipole is used"
-                 % material.name)
+        return _medium(settings)
     coat = _coat(xml.rgb("diffuseReflectance", (0, 0, 0)), settings.roughness, settings.ior)
     scale = xml.number("scale", settings.mm_per_unit)
-    if settings.model in ("DIPOLE", "MEDIUM"):
+    if settings.model == "DIPOLE":
         model = xml.element("subsurface", [
             xml.rgb("sigmaS", settings.sigma_s), xml.rgb("sigmaA", settings.sigma_a),
             xml.number("g", settings.anisotropy), xml.number("intIOR", settings.ior),

@@ -6,7 +6,7 @@ from . import presets
 
 MODELS = (
     ("OPAQUE", "None", "Not translucent: the material's own shader, translated"),
-    ("MEDIUM", "Participating media", "A homogeneous medium; drawn by the dipole so far"),
+    ("MEDIUM", "Participating media", "A homogeneous medium, path traced: slow and exact"),
     ("DIPOLE", "Dipole", "The dipole model of a homogeneous medium"),
     ("SVD", "Measured (svd)", "A factored, measured material: a preset or a file"),
 )
@@ -40,10 +40,13 @@ class NacreMaterial(bpy.types.PropertyGroup):
     anisotropy: bpy.props.FloatProperty(
         name="Anisotropy", description="Mean cosine of scattering", default=0.0, min=-0.95, max=0.95
     )
-    ior: bpy.props.FloatProperty(name="IOR", default=1.5, min=1.0, max=4.0)
+    ior: bpy.props.FloatProperty(
+        name="IOR", default=1.5, min=1.0, max=4.0,
+        description="Index of refraction; a medium of index 1 has no boundary",
+    )
     roughness: bpy.props.FloatProperty(
         name="Coat roughness", default=0.2, min=0.01, max=1.0,
-        description="Of the reflection on the surface",
+        description="Of the surface: of its reflection, and of the boundary of a medium",
     )
 
 
@@ -53,7 +56,8 @@ class NacreScene(bpy.types.PropertyGroup):
     preview_samples: bpy.props.IntProperty(
         name="Viewport samples", description="a pixel", default=4, min=1, max=4096)
     max_depth: bpy.props.IntProperty(
-        name="Path depth", description="Edges of a path, at most", default=6, min=1, max=1024)
+        name="Path depth", default=6, min=1, max=1024,
+        description="Edges of a path, at most; not counted where there are participating media")
     seed: bpy.props.IntProperty(name="Seed", default=1, min=0)
     time_limit: bpy.props.FloatProperty(
         name="Time limit", description="Seconds; 0: none", default=0.0, min=0.0)

@@ -5,6 +5,8 @@ import os
 from . import lights, log, materials, meshes, xml
 
 MESH_LIKE = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+# Emitters that no path can hit.
+DELTA = {"point", "spot", "directional", "projector"}
 
 
 class Exporter:
@@ -19,6 +21,8 @@ class Exporter:
         self.emitters = []
         self.soft_lamps = False
         self.shining_meshes = False
+        self.media = False
+        self.behind_glass = False
 
     def _files(self, obj):
         key = (obj.type, obj.data.as_pointer() if obj.type == "MESH" else obj.name_full)
@@ -44,7 +48,10 @@ class Exporter:
                 log.warn("%s: no UV map: all of it shows one point of the measured sample"
                          % obj.name)
             inside = materials.translate(material, self.folder)
-            self.shining_meshes |= any(tag == "emitter" for tag, _, _ in inside)
+            tags = {tag for tag, _, _ in inside}
+            self.shining_meshes |= "emitter" in tags
+            self.media |= "medium" in tags
+            self.behind_glass |= {"medium", "bsdf"} <= tags
             self.shapes.append(xml.element(
                 "shape", [xml.string("filename", name), xml.to_world(matrix), *inside], type="ply"))
 
@@ -68,20 +75,26 @@ class Exporter:
                 log.warn("%s: objects of type %s aren't translated" % (obj.name, obj.type.lower()))
 
     def _integrator(self):
-        hide = self.soft_lamps and not self.shining_meshes
-        if self.soft_lamps and self.shining_meshes:
-            log.warn("lamps with a size are seen by the camera, as some mesh shines too")
+        unseen = self.soft_lamps or self.scene.render.film_transparent
+        hide = unseen and not self.shining_meshes
+        if unseen and self.shining_meshes:
+            log.warn("lamps with a size and surroundings are seen by the camera, as some mesh "
+                     "shines too")
+        # In a medium, a path's edges are counted by hundreds: it ends by chance alone.
+        depth = -1 if self.media else self.scene.nacre.max_depth
         return xml.element("integrator", [
-            xml.integer("maxDepth", self.scene.nacre.max_depth),
-            xml.boolean("hideEmitters", hide),
-        ], type="path")
+            xml.integer("maxDepth", depth), xml.boolean("hideEmitters", hide),
+        ], type="volpath" if self.media else "path")
 
     def write(self, sensor):
         """Writes scene.xml and returns its path."""
         self.add_objects()
-        surroundings = lights.world(self.scene.world)
+        surroundings = lights.world(self.scene.world, self.folder)
         if surroundings is not None:
             self.emitters.append(surroundings)
+        if self.behind_glass and any(e[1]["type"] in DELTA for e in self.emitters):
+            log.warn("lamps without a size light a medium through its boundary by chance: "
+                     "give them a radius, or the medium an IOR of 1")
         if not self.emitters and not self.soft_lamps and not self.shining_meshes:
             log.warn("there is no light in the scene")
         root = xml.element(

@@ -27,10 +27,14 @@ def rgb(name, color):
     return element("rgb", name=name, value=", ".join("%.9g" % c for c in list(color)[:3]))
 
 
-def to_world(matrix):
+def transform(name, matrix):
     values = " ".join("%.9g" % matrix[row][column] for row in range(3) for column in range(4))
     values += " 0 0 0 1"
-    return element("transform", [element("matrix", value=values)], name="toWorld")
+    return element("transform", [element("matrix", value=values)], name=name)
+
+
+def to_world(matrix):
+    return transform("toWorld", matrix)
 
 
 def text(item, depth=0):
