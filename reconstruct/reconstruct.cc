@@ -26,7 +26,7 @@ namespace nacre::reconstruct {
 namespace {
 
 // One up whenever the same pictures give other values.
-constexpr int kReconstructionVersion = 3;
+constexpr int kReconstructionVersion = 4;
 
 using internal::GroupPicture;
 using internal::GroupReader;
@@ -255,40 +255,6 @@ void WriteSlices(const Finishing& finishing,
   Report(progress, {"reconstruct", header.points_y, header.points_y, "slices"});
 }
 
-// In some groups, evenly over those that were captured.
-internal::Gloss LookForGloss(const acquire::SessionReader& session,
-                             const calibrate::Calibration& calibration,
-                             const calibrate::CameraGeometry& camera,
-                             const calibrate::SamplePlane& plane,
-                             const ReconstructOptions& options) {
-  // It is looked for pixel by pixel, and a mosaic has gaps.
-  if (!options.remove_gloss || options.specular_radius_cells >= 0 ||
-      !calibration.corrections.filters.mosaic.empty()) {
-    return {};
-  }
-  constexpr int kGroups = 12;
-  const acquire::Schedule& schedule = session.schedule();
-  std::vector<bool> is_there(static_cast<std::size_t>(schedule.group_count()), true);
-  for (std::int64_t n = session.picture_count(); n < schedule.size(); ++n) {
-    if (schedule[n].group >= 0) {
-      is_there[static_cast<std::size_t>(schedule[n].group)] = false;
-    }
-  }
-  std::vector<int> there;
-  for (int g = 0; g < schedule.group_count(); ++g) {
-    if (is_there[static_cast<std::size_t>(g)]) {
-      there.push_back(g);
-    }
-  }
-  std::vector<int> some;
-  const int count = static_cast<int>(there.size());
-  for (int k = 0; k < std::min(kGroups, count); ++k) {
-    some.push_back(
-        there[static_cast<std::size_t>(k * count / std::min(kGroups, count))]);
-  }
-  return internal::MeasureGloss(session, calibration, camera, plane, some);
-}
-
 }  // namespace
 
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
@@ -315,12 +281,6 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   for (const calibrate::Warning& warning : state.warnings) {
     summary.warnings.push_back(warning.name + ": " + warning.text);
   }
-  // First, so that the memory it takes is there for what follows.
-  const internal::Gloss gloss =
-      LookForGloss(session, of_rig, calibration.camera, state.plane, options);
-  if (std::string text = gloss.Warning(header.channels); !text.empty()) {
-    summary.warnings.push_back(std::move(text));
-  }
   const GroupReader reader(
       session, calibration, state, header, spot, options.thread_count);
   const std::filesystem::path work = WorkFile(out);
@@ -329,8 +289,18 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
       options.incremental,
       {.key = KeyOf(session, calibration, work, spot),
        .group_count = summary.group_count,
-       .value_count = reader.lattice().CellCount() * std::ssize(header.channels)});
+       .value_count = reader.lattice().CellCount() * std::ssize(header.channels),
+       .channel_count = std::ssize(header.channels),
+       .most_spots = static_cast<std::int64_t>(reader.MostSpots())});
   Measure(reader, options, spool, summary, progress);
+  const bool looks_for_gloss =
+      options.remove_gloss && options.specular_radius_cells < 0;
+  const internal::Gloss gloss =
+      looks_for_gloss ? internal::MeasureGloss(session, of_rig, reader, spool)
+                      : internal::Gloss{};
+  if (std::string text = gloss.Warning(header.channels); !text.empty()) {
+    summary.warnings.push_back(std::move(text));
+  }
   spool.Forget();
 
   Separation separation(
@@ -344,8 +314,7 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   }
   summary.is_dense = separation.IsDense();
   spool.Forget();
-  const internal::GlossRemover remover(
-      gloss, calibration, state.plane, header, reader.weights());
+  const internal::GlossRemover remover(gloss, calibration, state.plane, header, reader);
   const auto& exposures_us = session.rig().camera.exposures_us;
   const Finishing finishing{
       calibration,

@@ -294,6 +294,9 @@ void Run(const Arguments& args) {
         reading,
         100 * reading / reconstructed,
         summary.Brief().c_str());
+    for (const std::string& warning : summary.warnings) {
+      std::printf("  %s\n", warning.c_str());
+    }
     std::FILE* file = args.values.empty()
                           ? nullptr
                           : std::fopen((args.values / phantom).c_str(), "wb");

@@ -2,8 +2,8 @@
 
 #include "acquire/session.h"
 #include "calibrate/calibration.h"
-#include "calibrate/session_state.h"
-#include "reconstruct/internal/cell_weights.h"
+#include "reconstruct/internal/group_reader.h"
+#include "reconstruct/internal/group_spool.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <array>
@@ -31,28 +31,23 @@ struct Gloss {
   std::string Warning(const std::vector<std::string>& channels) const;
 };
 
-/// Around a lit point light that was inside the sample is spread, that of the surface
-/// is as narrow as the laser's spot on the reference target. The mean profile around
-/// the spots of some pictures is fitted by s G(r) + Σ_m w_m K_m(r), all ≥ 0: G is the
-/// profile on the reference, K_m that of light from depth z_m,
-///   K(r) = z / 2π (z² + r²)^(3/2),
-/// blurred alike. What comes out nearer than the spot is wide is gloss by definition.
-/// `camera` sees the surface of the sample; the pictures of `groups` are looked at.
+/// From what was seen around the spots of all groups that `spool` holds (gloss_fit.h),
+/// by `reader`; the reference is looked at anew. `calibration`'s camera sees the sample
+/// plane. Nothing where too little was seen.
 Gloss MeasureGloss(const acquire::SessionReader& session,
                    const calibrate::Calibration& calibration,
-                   const calibrate::CameraGeometry& camera,
-                   const calibrate::SamplePlane& plane,
-                   const std::vector<int>& groups);
+                   const GroupReader& reader,
+                   const GroupSpool& spool);
 
 /// Takes it away from slices.
 class GlossRemover {
  public:
-  /// All must outlive this; `camera` sees the surface, `weights` are for it.
+  /// All must outlive this; `reader`'s calibration is `calibration`.
   GlossRemover(const Gloss& gloss,
                const calibrate::Calibration& calibration,
                const calibrate::SamplePlane& plane,
                const RdHeader& header,
-               const CellWeights& weights);
+               const GroupReader& reader);
 
   /// From the cells around the lit one of slice s, as they show a spot on the
   /// reference; what is uncertain about it is added to their sigma.
@@ -68,7 +63,7 @@ class GlossRemover {
   const calibrate::Calibration& calibration_;
   const calibrate::SamplePlane& plane_;
   const RdHeader& header_;
-  const CellWeights& weights_;
+  const GroupReader& reader_;
 };
 
 }  // namespace nacre::reconstruct::internal

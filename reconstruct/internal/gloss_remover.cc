@@ -22,16 +22,17 @@ GlossRemover::GlossRemover(const Gloss& gloss,
                            const calibrate::Calibration& calibration,
                            const calibrate::SamplePlane& plane,
                            const RdHeader& header,
-                           const CellWeights& weights)
+                           const GroupReader& reader)
     : gloss_(gloss),
       calibration_(calibration),
       plane_(plane),
       header_(header),
-      weights_(weights) {}
+      reader_(reader) {}
 
 std::array<double, GlossRemover::kSide * GlossRemover::kSide> GlossRemover::Response(
     int i, int j) const {
-  const calibrate::CameraGeometry& camera = calibration_.camera;
+  const calibrate::CameraGeometry& camera = reader_.camera();
+  const CellWeights& weights = reader_.weights();
   const auto width = static_cast<std::size_t>(camera.width_px);
   // A picture with nothing but the spot; kept, so that only it needs to be cleared.
   thread_local RateFrame frame;
@@ -67,13 +68,13 @@ std::array<double, GlossRemover::kSide * GlossRemover::kSide> GlossRemover::Resp
     for (int u = -kReach; u <= kReach; ++u) {
       const int column = i + header_.Radius() + u;
       const int row = j + header_.Radius() + v;
-      const CellLattice& lattice = weights_.lattice();
+      const CellLattice& lattice = weights.lattice();
       if (column < 0 || row < 0 || column >= lattice.columns || row >= lattice.rows) {
         continue;
       }
       double& mean =
           response[static_cast<std::size_t>((v + kReach) * kSide + u + kReach)];
-      mean = weights_.Mean(frame, lattice.Index(column, row)).mean;
+      mean = weights.Mean(frame, lattice.Index(column, row)).mean;
       sum += mean * header_.CellAreaMm2();
     }
   }

@@ -67,11 +67,20 @@ GroupReader::GroupReader(const acquire::SessionReader& session,
       calibration_(calibration),
       state_(state),
       header_(header),
+      rings_(calibration, calibration.camera),
       pictures_(FindPictures(session)) {
+  std::vector<PointMm> offsets = BeamOffsets(session, calibration, header);
+  for (std::int64_t s = 0; s < header.PointCount(); ++s) {
+    const PointMm x_i = header.GridPoint(static_cast<int>(s % header.points_x),
+                                         static_cast<int>(s / header.points_x));
+    const PointMm off = offsets[static_cast<std::size_t>(s)];
+    spots_.push_back(
+        OnSurface(calibration, state.plane, {x_i.x + off.x, x_i.y + off.y}));
+  }
   AddPlanes({.spot = spot,
              .place = WhereLit(calibration, state.plane),
              .on_surface = OnPlane(calibration, state.plane),
-             .beam_offsets = BeamOffsets(session, calibration, header)},
+             .beam_offsets = std::move(offsets)},
             thread_count);
   const calibrate::Glare& glare = calibration.corrections.glare;
   if (glare.fraction > 0) {
@@ -136,7 +145,7 @@ std::vector<bool> GroupReader::LitPoints() const {
   return lit;
 }
 
-double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
+double GroupReader::RelativeFlux(int group, int channel) const {
   double flux = 0;
   double count = 0;
   for (const std::int64_t number : Pictures(group, channel)) {
@@ -145,8 +154,32 @@ double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
       count += 1;
     }
   }
-  return calibration_.RdPerRate(channel, header_.GridPoint(i, j), {0, 0}, header_.eta) *
-         (count > 0 ? count / flux : 1);
+  return count > 0 ? flux / count : 1;
+}
+
+double GroupReader::EnterFactor(int group, int channel, int i, int j) const {
+  return calibration_.RdPerRate(channel, header_.GridPoint(i, j), {0, 0}, header_.eta) /
+         RelativeFlux(group, channel);
+}
+
+std::size_t GroupReader::MostSpots() const {
+  std::size_t most = 0;
+  for (int group = 0; group < session_.schedule().group_count(); ++group) {
+    most = std::max(most, session_.schedule().Group(group).size());
+  }
+  return most;
+}
+
+void GroupReader::ReadRings(const RateFrame& rates,
+                            int group,
+                            int channel,
+                            std::span<SpotRings> rings) const {
+  std::size_t k = 0;
+  for (const acquire::GridIndex& point : session_.schedule().Group(group)) {
+    const PointMm spot = spots_[static_cast<std::size_t>(
+        std::int64_t{point.j} * header_.points_x + point.i)];
+    rings[k++] = rings_.Around(rates, channel, spot, rings_.RingMm());
+  }
 }
 
 void GroupReader::AddPlanes(const SurfaceModel& surface, int thread_count) {
@@ -211,6 +244,8 @@ GroupPicture GroupReader::Read(int group) const {
   picture.rd.assign(channels * cells, 0.0F);
   picture.sigma.assign(channels * cells, -1.0F);
   picture.floor.assign(channels * cells, 0.0F);
+  const std::size_t spots = MostSpots();
+  picture.rings.resize(channels * spots);
   RateFrame rates;
   std::vector<acquire::Frame> frames;
   for (std::size_t c = 0; c < channels; ++c) {
@@ -230,6 +265,10 @@ GroupPicture GroupReader::Read(int group) const {
                             std::span(picture.sigma).subspan(c * cells, cells),
                             std::span(picture.floor).subspan(c * cells, cells)};
     ReadPlanes(rates, group, c, values);
+    ReadRings(rates,
+              group,
+              static_cast<int>(c),
+              std::span(picture.rings).subspan(c * spots, spots));
     ToRd(values);
   }
   return picture;
@@ -251,7 +290,7 @@ void GroupReader::ToRd(CellValues cells) const {
 }
 
 std::size_t GroupReader::SharedBytes() const {
-  std::size_t bytes = 0;
+  std::size_t bytes = rings_.MemoryBytes();
   for (const PlaneReader& plane : planes_) {
     bytes += plane.MemoryBytes();
   }

@@ -5,6 +5,7 @@
 #include "calibrate/session_state.h"
 #include "reconstruct/internal/hdr_merge.h"
 #include "reconstruct/internal/plane_reader.h"
+#include "reconstruct/internal/spot_rings.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <cstdint>
@@ -18,9 +19,10 @@ namespace nacre::reconstruct::internal {
 /// windows are cut from: R_d as if all light had entered with factor 1 (see
 /// GroupReader::EnterFactor), summed over the group's spots.
 struct GroupPicture {
-  std::vector<float> rd;     ///< [channel][cell]
-  std::vector<float> sigma;  ///< of noise; below 0 where it isn't measured
-  std::vector<float> floor;  ///< standard deviation of what glare leaves there
+  std::vector<float> rd;         ///< [channel][cell]
+  std::vector<float> sigma;      ///< of noise; below 0 where it isn't measured
+  std::vector<float> floor;      ///< standard deviation of what glare leaves there
+  std::vector<SpotRings> rings;  ///< [channel][spot], rows padded to the longest group
   std::int64_t frame_count = 0;
   std::int64_t saturated_count = 0;
 };
@@ -41,6 +43,10 @@ class GroupReader {
   const CellLattice& lattice() const { return planes_.front().weights().lattice(); }
   /// Of the first plane, which is all of a monochrome sensor.
   const CellWeights& weights() const { return planes_.front().weights(); }
+  const calibrate::CameraGeometry& camera() const { return planes_.front().camera(); }
+  double RingMm() const { return rings_.RingMm(); }
+  /// Spots of the longest group.
+  std::size_t MostSpots() const;
 
   /// Whether all of the group's pictures were taken, or left out on purpose.
   bool IsThere(int group) const;
@@ -52,6 +58,8 @@ class GroupReader {
   /// R_d of light that entered at grid point (i, j) of that group is this factor times
   /// the lattice's. The laser's power when the pictures were taken is in it.
   double EnterFactor(int group, int channel, int i, int j) const;
+  /// The laser's power in the group's pictures, in units of the calibration's.
+  double RelativeFlux(int group, int channel) const;
 
   /// A grid point at a time, row by row: whether the laser went there. The rig's
   /// outline and an adaptive capture leave points out.
@@ -76,6 +84,10 @@ class GroupReader {
                   std::size_t channel,
                   CellValues cells) const;
   void ToRd(CellValues cells) const;
+  void ReadRings(const RateFrame& rates,
+                 int group,
+                 int channel,
+                 std::span<SpotRings> rings) const;
 
   const acquire::SessionReader& session_;
   const calibrate::Calibration& calibration_;
@@ -83,6 +95,8 @@ class GroupReader {
   const RdHeader& header_;
   std::vector<PlaneReader> planes_;       // those that any channel needs
   std::vector<std::vector<Part>> parts_;  // a channel
+  RingReader rings_;
+  std::vector<PointMm> spots_;  // on the surface, a grid point
   /// [group · channels + channel]: numbers of the pictures, one an exposure.
   std::vector<std::vector<std::int64_t>> pictures_;
   /// R_d of unit rate is exit_factor_[cell] · that of the spot and channel.

@@ -17,10 +17,11 @@ namespace {
 
 // The head of the file; a file of another version differs in the first word.
 struct FileHead {
-  std::array<char, 8> magic = {'N', 'A', 'C', 'R', 'E', 'W', 'K', '2'};
+  std::array<char, 8> magic = {'N', 'A', 'C', 'R', 'E', 'W', 'K', '3'};
   std::uint64_t key = 0;
   std::int64_t group_count = 0;
   std::int64_t value_count = 0;
+  std::int64_t ring_count = 0;
   friend bool operator==(const FileHead&, const FileHead&) = default;
 };
 
@@ -73,7 +74,8 @@ GroupSpool::GroupSpool(const std::filesystem::path& path,
   }
   const FileHead wanted{.key = shape.key,
                         .group_count = shape.group_count,
-                        .value_count = shape.value_count};
+                        .value_count = shape.value_count,
+                        .ring_count = shape.channel_count * shape.most_spots};
   FileHead found{};
   struct stat status {};
   const std::int64_t size = Offset(static_cast<int>(shape.group_count));
@@ -104,13 +106,16 @@ GroupSpool::~GroupSpool() {
   }
 }
 
-std::int64_t GroupSpool::SlotBytes() const {
-  return static_cast<std::int64_t>(sizeof(SlotHead)) +
-         kArrays * shape_.value_count * static_cast<std::int64_t>(sizeof(float));
+std::int64_t GroupSpool::PayloadBytes() const {
+  return kArrays * shape_.value_count * static_cast<std::int64_t>(sizeof(float)) +
+         shape_.channel_count * shape_.most_spots *
+             static_cast<std::int64_t>(sizeof(SpotRings));
 }
 
 std::int64_t GroupSpool::Offset(int g) const {
-  return static_cast<std::int64_t>(sizeof(FileHead)) + g * SlotBytes();
+  const auto whole = static_cast<std::int64_t>(sizeof(SlotHead));
+  const std::int64_t slot = (PayloadBytes() + whole - 1) / whole * whole + whole;
+  return static_cast<std::int64_t>(sizeof(FileHead)) + g * slot;
 }
 
 const GroupSpool::SlotHead& GroupSpool::Head(int g) const {
@@ -133,6 +138,13 @@ std::span<const float> GroupSpool::Floor(int g) const {
           static_cast<std::size_t>(shape_.value_count)};
 }
 
+std::span<const SpotRings> GroupSpool::Rings(int g, int channel) const {
+  const auto* first = static_cast<const SpotRings*>(
+      static_cast<const void*>(Rd(g).data() + kArrays * shape_.value_count));
+  return {first + channel * shape_.most_spots,
+          static_cast<std::size_t>(shape_.most_spots)};
+}
+
 void GroupSpool::Forget() const {
   // The map is shared and only read: nothing is lost, and if it fails nothing is won.
   ::madvise(const_cast<unsigned char*>(mapped_),
@@ -150,8 +162,7 @@ std::int64_t GroupSpool::SaturatedCount(int g) const {
 
 bool GroupSpool::TakeUp(int g, std::uint64_t state) {
   const SlotHead& head = Head(g);
-  const std::size_t bytes =
-      kArrays * static_cast<std::size_t>(shape_.value_count) * sizeof(float);
+  const auto bytes = static_cast<std::size_t>(PayloadBytes());
   const bool whole = head.payload != 0 && head.state == state &&
                      head.payload == Hash64(Rd(g).data(), bytes);
   held_[static_cast<std::size_t>(g)] = whole ? 1 : 0;
@@ -159,19 +170,25 @@ bool GroupSpool::TakeUp(int g, std::uint64_t state) {
 }
 
 void GroupSpool::Park(int g, std::uint64_t state, const GroupPicture& picture) {
+  Expect(std::ssize(picture.rings) == shape_.channel_count * shape_.most_spots,
+         "rings of the spool's shape");
   std::int64_t offset = Offset(g) + static_cast<std::int64_t>(sizeof(SlotHead));
-  std::int64_t bytes = 0;
+  const auto write = [&](const auto& values) {
+    const std::size_t size = values.size() * sizeof(values[0]);
+    WriteAll(fd_, values.data(), size, offset);
+    offset += static_cast<std::int64_t>(size);
+  };
   for (const std::vector<float>* values :
        {&picture.rd, &picture.sigma, &picture.floor}) {
     Expect(std::ssize(*values) == shape_.value_count, "a picture of the spool's shape");
-    const std::size_t size = values->size() * sizeof(float);
-    WriteAll(fd_, values->data(), size, offset + bytes);
-    bytes += static_cast<std::int64_t>(size);
+    write(*values);
   }
-  const SlotHead head{.state = state,
-                      .payload = Hash64(Rd(g).data(), static_cast<std::size_t>(bytes)),
-                      .frame_count = picture.frame_count,
-                      .saturated_count = picture.saturated_count};
+  write(picture.rings);
+  const SlotHead head{
+      .state = state,
+      .payload = Hash64(Rd(g).data(), static_cast<std::size_t>(PayloadBytes())),
+      .frame_count = picture.frame_count,
+      .saturated_count = picture.saturated_count};
   WriteAll(fd_, &head, sizeof head, Offset(g));
   held_[static_cast<std::size_t>(g)] = 1;
 }

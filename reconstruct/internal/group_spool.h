@@ -17,6 +17,8 @@ class GroupSpool {
     std::uint64_t key = 0;  ///< of all that the pictures' values depend on
     std::int64_t group_count = 0;
     std::int64_t value_count = 0;  ///< of one group, channels · cells
+    std::int64_t channel_count = 0;
+    std::int64_t most_spots = 0;  ///< of a group
   };
 
   /// `path`: of the file; `is_named` or else only to be in that folder. A file of
@@ -40,13 +42,15 @@ class GroupSpool {
   std::span<const float> Rd(int g) const;
   std::span<const float> Sigma(int g) const;
   std::span<const float> Floor(int g) const;
+  /// Of the group's spots, padded with empty ones.
+  std::span<const SpotRings> Rings(int g, int channel) const;
   std::int64_t FrameCount(int g) const;
   std::int64_t SaturatedCount(int g) const;
 
  private:
   struct SlotHead;
   const SlotHead& Head(int g) const;
-  std::int64_t SlotBytes() const;
+  std::int64_t PayloadBytes() const;
   std::int64_t Offset(int g) const;
 
   Shape shape_;

@@ -43,6 +43,7 @@ class PlaneReader {
               int thread_count);
 
   const CellWeights& weights() const { return weights_; }
+  const calibrate::CameraGeometry& camera() const { return camera_; }
 
   /// Means over cells of a merged picture less ambient light and glare; windows moved
   /// to where the beams of `group` were.
