@@ -143,11 +143,11 @@ double BeyondSpotPx(const acquire::SessionReader& session,
                     const RatePictures& pictures,
                     const Foundation& f) {
   // Spots are a pixel or two wide, whatever the sensor; somewhat more of a fine one.
-  constexpr double kLeastPx = 4;
+  constexpr double kLeastPx = 3;
   const CameraGeometry& camera = f.geometry.camera;
   const double pixel_mm =
       std::sqrt(camera.FootprintMm2({0.5 * camera.width_px, 0.5 * camera.height_px}));
-  constexpr double kSigmas = 4.5;
+  constexpr double kSigmas = 3.7;
   return std::max(
       kLeastPx + camera.width_px / 500.0,
       kSigmas * SpotSigmaMm(session, camera, f.laser.map, pictures) / pixel_mm);

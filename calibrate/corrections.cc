@@ -54,8 +54,11 @@ std::vector<float> SmoothField::Map(int width_px, int height_px) const {
 }
 
 double Glare::DensityAt(double distance_px) const {
-  if (radius_px.empty() || distance_px < radius_px.front()) {
+  if (radius_px.empty()) {
     return 0;
+  }
+  if (distance_px < radius_px.front()) {
+    return density_per_px2.front();
   }
   const auto above = std::upper_bound(radius_px.begin(), radius_px.end(), distance_px) -
                      radius_px.begin();

@@ -71,7 +71,8 @@ struct Glare {
   double fraction_sigma = 0;
 
   bool empty() const { return radius_px.empty(); }
-  /// 0 within radius_px.front(); beyond the last radius the last two go on.
+  /// Within radius_px.front(), where the spot itself hides it, what it is there: no
+  /// less, since it falls outwards. Beyond the last radius the last two go on.
   double DensityAt(double distance_px) const;
 };
 

@@ -233,8 +233,9 @@ GlareResult EstimateGlare(const acquire::SessionReader& session,
     glare.radius_px.push_back(k == 0 ? beyond_px : std::exp(ring.radius / ring.weight));
     glare.density_per_px2.push_back(density);
     glare.sigma_per_px2.push_back(sigma);
-    glare.fraction += area * density;
-    fraction_variance += area * area * sigma * sigma;
+    const double inside = k == 0 ? std::numbers::pi * inner * inner : 0;
+    glare.fraction += (area + inside) * density;
+    fraction_variance += std::pow((area + inside) * sigma, 2);
   }
   glare.fraction_sigma = std::sqrt(fraction_variance);
   constexpr std::size_t kFewest = 3;

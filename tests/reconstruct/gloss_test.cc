@@ -1,5 +1,7 @@
 #include "reconstruct/internal/gloss.h"
 
+#include "core/random.h"
+#include "reconstruct/internal/gloss_fit.h"
 #include "reconstruct/internal/nonnegative_fit.h"
 #include "reconstruct/internal/polygon.h"
 #include "reconstruct/internal/sharpener.h"
@@ -98,6 +100,108 @@ TEST(Gloss, DensityOfAGaussianIsExactBetweenItsRings) {
   EXPECT_NEAR(gloss.Density(0.25), 3 * std::exp(-1.25), 1e-12);
   EXPECT_NEAR(gloss.Density(0.05), 3 * std::exp(-0.25), 1e-12);
   EXPECT_EQ(gloss.Density(1.0), 0);
+}
+
+constexpr double kSpotMm = 0.23;
+constexpr double kRingMm = 0.1;
+
+// Rings of a radial profile, f(r²) a pixel, with so much relative noise.
+template <class Profile>
+SpotRings RingsOf(Profile&& profile, double noise, RandomStream& random) {
+  SpotRings rings;
+  for (std::size_t k = 0; k < SpotRings::kCount; ++k) {
+    const double r = kRingMm * (static_cast<double>(k) + 0.55);
+    const double pixels = 40 * (static_cast<double>(k) + 1);
+    rings.pixels[k] = static_cast<float>(pixels);
+    rings.square_mm2[k] = static_cast<float>(pixels * r * r);
+    rings.sum[k] = static_cast<float>(pixels * profile(r * r) *
+                                      (1 + noise * (random.Uniform() - 0.5)));
+  }
+  return rings;
+}
+
+// Light scattered once: events at all depths, also right below the surface, which a
+// mixture of dipoles from some depth on doesn't have; and a dipole.
+double Inside(double r2, double mean_depth_mm, double single) {
+  const auto dipole = [&](double z) {
+    const double d2 = r2 + z * z + kSpotMm * kSpotMm;  // nearly its blur
+    const double d = std::sqrt(d2);
+    return z * (1 + 0.5 * d / z) * std::exp(-0.5 * d / z) / (6.28 * d2 * d);
+  };
+  double once = 0;
+  for (double t = 0.125; t < 3; t += 0.25) {
+    once += 0.25 * std::exp(-t) * dipole(t * mean_depth_mm);
+  }
+  return (1 - single) * dipole(mean_depth_mm) + single * once;
+}
+
+// Three channels of darker and darker media; half of the spots in each lie in another.
+std::vector<SpotsOfChannel> Skin(const std::vector<double>& gloss, double single) {
+  RandomStream random(5, 0);
+  const auto spot = [](double r2) {
+    return std::exp(-0.5 * r2 / (kSpotMm * kSpotMm)) / (6.283 * kSpotMm * kSpotMm);
+  };
+  std::vector<SpotsOfChannel> channels;
+  for (std::size_t c = 0; c < gloss.size(); ++c) {
+    SpotsOfChannel& channel = channels.emplace_back();
+    channel.reference = RingsOf(spot, 1e-3, random);
+    for (int n = 0; n < 96; ++n) {
+      const double depth =
+          (n % 2 == 0 ? 1.2 : 1.0) / (1 + 0.35 * static_cast<double>(c));
+      const double albedo = 0.7 / (1 + static_cast<double>(c)) - 0.05 * (n % 3);
+      channel.spots.push_back(RingsOf(
+          [&](double r2) {
+            return gloss[c] * spot(r2) + albedo * Inside(r2, depth, single);
+          },
+          0.01,
+          random));
+    }
+  }
+  return channels;
+}
+
+TEST(FitGloss, TellsItFromLightThatComesOutCloseBy) {
+  for (const Estimate& e : FitGloss(Skin({0.05, 0.05, 0.05}, 0), 1.4)) {
+    EXPECT_NEAR(e.value, 0.05, 0.0012);
+    EXPECT_NEAR(e.value, 0.05, 3 * e.sigma);
+  }
+}
+
+TEST(FitGloss, FindsNoneWhereThereIsNone) {
+  for (const Estimate& e : FitGloss(Skin({0, 0, 0}, 0), 1.4)) {
+    EXPECT_LT(std::abs(e.value), 3 * e.sigma + 2e-4);
+  }
+}
+
+TEST(FitGloss, AChannelThatDiffersKeepsItsOwn) {
+  const std::vector<Estimate> found = FitGloss(Skin({0.05, 0.02, 0.05}, 0), 1.4);
+  EXPECT_NEAR(found[0].value, 0.05, 0.002);
+  EXPECT_NEAR(found[1].value, 0.02, 3 * found[1].sigma);
+  EXPECT_LT(found[1].value, 0.03);  // nearer to its own than to the others'
+}
+
+// Light scattered once comes out nearer than the spot is wide as well; what isn't told
+// apart is what there is of it, a known share.
+TEST(FitGloss, SingleScatteringCountsAsGlossOnlyWhereItIsNearerThanTheSpot) {
+  for (const Estimate& e : FitGloss(Skin({0.05, 0.05, 0.05}, 0.3), 1.4)) {
+    EXPECT_GT(e.value, 0.05 - 3 * e.sigma);
+    EXPECT_LT(e.value, 0.05 + 0.3 * 0.7 * 0.25);
+  }
+}
+
+TEST(Pool, OfEstimatesThatAgreeIsTheWeightedMean) {
+  const Pooled pooled = Pool({{1.0, 0.1}, {1.1, 0.2}});
+  EXPECT_EQ(pooled.tau2, 0);
+  EXPECT_NEAR(pooled.mean.value, (1.0 * 100 + 1.1 * 25) / 125, 1e-12);
+  EXPECT_NEAR(pooled.mean.sigma, 1 / std::sqrt(125.0), 1e-12);
+}
+
+// As in the paper's method of moments: of two, τ² is half their squared difference less
+// the mean variance.
+TEST(Pool, OfEstimatesThatDisagreeIsAsUncertainAsTheyAreApart) {
+  const Pooled pooled = Pool({{0.0, 0.1}, {2.0, 0.1}});
+  EXPECT_NEAR(pooled.tau2, 0.5 * 4 - 0.01, 1e-9);
+  EXPECT_NEAR(pooled.mean.sigma, 1, 1e-9);
 }
 
 TEST(Gloss, IsToldOfWhereItStandsOutOfItsUncertainty) {
