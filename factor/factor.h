@@ -31,6 +31,7 @@ struct FactorOptions {
   int window_rank = 1;
   int taps = 3;
   int sides = 0;
+  int rest = 0;
   double totals = 0.01;
   double memory_mb = 1000;
 
@@ -111,6 +112,12 @@ struct FactorOptions {
         Range{0, 1},
         "of reciprocal: 1 has a map for how light that enters at a point differs from "
         "light that leaves from a cell; R_d without it is the same both ways");
+    visit(
+        "rest",
+        self.rest,
+        Range{0, 256},
+        "of reciprocal: at most so many maps more, for what those at points can't tell "
+        "of a pair; as many as stand out of the noise are kept");
     visit("totals",
           self.totals,
           Range{0, 1},

@@ -94,7 +94,7 @@ int Material::KernelCount() const {
     case Form::kBilinear:
       return terms * (terms + 1) / 2;
     case Form::kReciprocal:
-      return internal::ReciprocalKernelCount(terms, taps) + sides;
+      return internal::ReciprocalKernelCount(terms, taps) + rest + sides;
     case Form::kTucker:
     case Form::kProfiles:
     case Form::kSum:
@@ -240,6 +240,10 @@ void Validate(const Material& m, const std::string& origin) {
   check.Require(m.sides == 0 || (m.sides == 1 && m.form == Form::kReciprocal),
                 "sides",
                 fmt::format("{}", m.sides));
+  check.Require(
+      m.rest == 0 || (m.rest > 0 && m.rest <= 256 && m.form == Form::kReciprocal),
+      "rest",
+      fmt::format("{}", m.rest));
   check.Require(m.order >= 0 && m.order <= 8, "order", fmt::format("{}", m.order));
   const std::int64_t maps = std::int64_t{m.MapSets()} * m.MapCount();
   const std::int64_t kernels =

@@ -51,16 +51,18 @@ struct Steps {
 ///   row_scale_c(x_i) · max(0, T_c(Σ_j f_cj(x_i) h_ckj(d))),  k = cluster(x_i),
 ///   max(0, Σ_jk f_j(x_i) h_cjk(d) f_k(x_o)),  h_cjk(d) = h_ckj(−d),  x_o = x_i + d.
 ///   row_scale_c(x_i) row_scale_c(x_o) A_c exp(h_c0(d) + Σ_j Σ_t h_cjt(d) φ_t[f_j]
-///     + Σ_{j ≤ k} h_cjk(d) (f_j(x_i) f_k(x_o) + f_k(x_i) f_j(x_o))),  h(−d) = h(d),
+///     + Σ_{j ≤ k} h_cjk(d) (f_j(x_i) f_k(x_o) + f_k(x_i) f_j(x_o))
+///     + Σ_k v_ck(d) u_k(p)),  h(−d) = h(d),  v(−d) = v(d),
 ///   row_scale_c(x_i) max(0, Σ_{p ≤ P} a_cp(x_i) (Σ_t f_t(x_i) h_t(d − shift(x_i)))^p),
 ///   √(P_c(x_i) P_c(x_o)),  P_c(x) = Σ_t f_ct(x) β_ct/2π exp(−β_ct |d|²/2),
 /// with taps φ_0[f] = f(x_i) + f(x_o), φ_1[f] = 2 f(middle), φ_2[f] the sum of f at the
 /// quarters of the way, φ_3[f] half of that at its odd eighths, the exponent being cut
-/// at ln 3; d − shift goes around the window's edges. Bilinear, reciprocal and profiles
-/// are reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d); reciprocal is
-/// positive. That of a point lit alone, which is what a dataset holds, is R_d times
-/// exp(g_c(d) (q(x_i) − q(x_o))) if the material has sides. Indices, units and
-/// orientation are those of reconstruct::RdHeader.
+/// at ln 3; p is the point of the pair from which the other lies in the first half of
+/// the window's cells; d − shift goes around the window's edges. Bilinear, reciprocal
+/// and profiles are reciprocal to the last bit: R'_d(x_i, d) = R'_d(x_o, −d);
+/// reciprocal is positive. That of a point lit alone, which is what a dataset holds, is
+/// R_d times exp(g_c(d) (q(x_i) − q(x_o))) if the material has sides. Indices, units
+/// and orientation are those of reconstruct::RdHeader.
 struct Material {
   int points_x = 0;
   int points_y = 0;
@@ -76,6 +78,7 @@ struct Material {
   int margin = 0;  ///< shared maps go on for so many points beyond the grid
   int taps = 1;    ///< 1 to 4 (kReciprocal)
   int order = 0;   ///< P, 0 to 8 (kTucker)
+  int rest = 0;    ///< maps and kernels of pairs, after those of terms (kReciprocal)
   int sides = 0;   ///< 1: map q and kernels g are there, after the others (kReciprocal)
 
   std::vector<double> a;  ///< A a channel (kLog, kReciprocal)
@@ -85,8 +88,8 @@ struct Material {
   std::vector<float> f;
   /// [channel][cluster][term][v][u]; kBilinear: [channel][pair][v][u], pairs being
   /// (0, 0), (0, 1), …, (1, 1), (1, 2), …; kReciprocal: [channel][kernel][v][u], the
-  /// constant, then [tap][term], then pairs, of rows up to the middle one; kTucker:
-  /// [term][v][u]; kProfiles: [channel][term], ln β, β in mm⁻².
+  /// constant, then [tap][term], then pairs, then v, of rows up to the middle one;
+  /// kTucker: [term][v][u]; kProfiles: [channel][term], ln β, β in mm⁻².
   std::vector<float> h;
   std::vector<std::uint8_t> cluster;  ///< [j][i], all 0 without clustering
   std::vector<float> row_scale;  ///< [channel][j][i]; makes each slice's total exact
@@ -110,7 +113,7 @@ struct Material {
   int MapCount() const {
     return form == Form::kTucker
                ? terms + static_cast<int>(channels.size()) * (order + 1) + 1
-               : terms + sides;
+               : terms + rest + sides;
   }
   /// Sets of kernels: one a channel, or one for all.
   int KernelSets() const {

@@ -70,6 +70,17 @@ class AttributeReader {
   std::string path_;
 };
 
+int ParseCount(const AttributeReader& attributes, const std::string& name, int most) {
+  const double count = attributes.Number(name);
+  if (!(count >= 0 && count <= most && count == std::floor(count))) {
+    throw attributes.At(
+        name,
+        fmt::format(
+            "is {}, not a whole number from 0 to {}", attributes.Text(name), most));
+  }
+  return static_cast<int>(count);
+}
+
 Form ParseForm(const AttributeReader& attributes) {
   const std::string& text = attributes.Text("form");
   for (const Form form : {Form::kSum,
@@ -150,20 +161,17 @@ Material ReadAttributes(const AttributeReader& attributes) {
     }
   }
   const std::string& version = attributes.Text("version");
-  if (version == internal::kVersion || version == internal::kVersionWithoutOrder) {
+  const bool has_order =
+      version == internal::kVersion || version == internal::kVersionWithoutRest;
+  if (has_order || version == internal::kVersionWithoutOrder) {
     m.taps = attributes.Integer("taps");
   }
   if (version == internal::kVersion) {
-    const double order = attributes.Number("order");
-    if (!(order >= 0 && order <= 8 && order == std::floor(order))) {
-      throw attributes.At("order", "is " + attributes.Text("order") + ", not 0 to 8");
-    }
-    m.order = static_cast<int>(order);
-    const double sides = attributes.Number("sides");
-    if (!(sides == 0 || sides == 1)) {
-      throw attributes.At("sides", "is " + attributes.Text("sides") + ", not 0 or 1");
-    }
-    m.sides = static_cast<int>(sides);
+    m.rest = ParseCount(attributes, "rest", 256);
+  }
+  if (has_order) {
+    m.order = ParseCount(attributes, "order", 8);
+    m.sides = ParseCount(attributes, "sides", 1);
   }
   m.provenance = attributes.Text("provenance");
   const Json channels = attributes.List("channels");
@@ -279,7 +287,8 @@ Material ReadMaterial(const std::filesystem::path& path) {
   }
   const AttributeReader attributes(found, path.string());
   const std::string& version = attributes.Text("version");
-  if (version != internal::kVersion && version != internal::kVersionWithoutOrder &&
+  if (version != internal::kVersion && version != internal::kVersionWithoutRest &&
+      version != internal::kVersionWithoutOrder &&
       version != internal::kVersionWithoutTaps && version != internal::kOldVersion) {
     throw attributes.At("version",
                         "is " + version + "; this build reads " +

@@ -64,6 +64,7 @@ ExrAttributes AttributesOf(const Material& m) {
           {"nacre.margin", std::to_string(m.margin)},
           {"nacre.taps", std::to_string(m.taps)},
           {"nacre.order", std::to_string(m.order)},
+          {"nacre.rest", std::to_string(m.rest)},
           {"nacre.sides", std::to_string(m.sides)},
           {"nacre.transform", Name(m.transform)},
           {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},

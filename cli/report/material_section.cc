@@ -141,6 +141,10 @@ std::string KernelName(const Material& m, int n) {
       return name;
     }
     n -= 1 + m.taps * m.terms;
+    const int beyond = n - m.terms * (m.terms + 1) / 2;
+    if (beyond >= 0) {
+      return beyond < m.rest ? fmt::format("v{}", beyond + 1) : "g";
+    }
   }
   int first = 0;
   while (n >= m.terms - first) {

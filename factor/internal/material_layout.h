@@ -22,7 +22,9 @@
 namespace nacre::factor::internal {
 
 inline constexpr const char* kFormat = "material";
-inline constexpr const char* kVersion = "4";
+inline constexpr const char* kVersion = "5";
+/// The same without rest.
+inline constexpr const char* kVersionWithoutRest = "4";
 /// Without tucker and profiles.
 inline constexpr const char* kVersionWithoutOrder = "3";
 /// Without taps and the form they are of.

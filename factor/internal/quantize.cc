@@ -69,6 +69,10 @@ std::vector<double> ReciprocalMapWeights(const Material& m) {
         }
         squares[static_cast<std::size_t>(j)] += weight * sum;
       }
+      for (int k = 0; k < m.rest; ++k) {
+        squares[static_cast<std::size_t>(m.terms + k)] +=
+            weight * std::pow(kernel(ReciprocalKernelCount(m.terms, m.taps) + k), 2);
+      }
       if (m.sides > 0) {
         squares.back() += weight * std::pow(2 * kernel(m.KernelCount() - 1), 2);
       }

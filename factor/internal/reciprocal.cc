@@ -50,6 +50,11 @@ std::size_t IndexIn(const Material& m, GridIndex point) {
   return static_cast<std::size_t>(std::int64_t{y} * m.MapWidth() + x);
 }
 
+// Whether the point that a window is around is the first of its pair with a cell.
+bool IsFirst(const Material& m, std::int64_t cell) {
+  return cell <= (m.WindowSize() - 1) / 2;
+}
+
 // What kernels multiply, at the cells around a grid point.
 class Features {
  public:
@@ -58,7 +63,8 @@ class Features {
         taps_(WindowTaps::Of(m)),
         point_(point),
         here_(Maps(point)),
-        values_(static_cast<std::size_t>(ReciprocalKernelCount(m.terms, m.taps))) {}
+        values_(static_cast<std::size_t>(ReciprocalKernelCount(m.terms, m.taps) +
+                                         m.rest)) {}
 
   const std::vector<double>& At(GridIndex cell) {
     const int radius = (m_.core - 1) / 2;
@@ -85,6 +91,14 @@ class Features {
         values_[pair++] = here_[j] * there[k] + here_[k] * there[j];
       }
     }
+    const GridIndex first =
+        IsFirst(m_, std::int64_t{cell.y} * m_.core + cell.x)
+            ? point_
+            : GridIndex{point_.x + cell.x - radius, point_.y + cell.y - radius};
+    for (int k = 0; k < m_.rest; ++k) {
+      values_[pair++] =
+          static_cast<double>(m_.FactorMap(0, m_.terms + k)[IndexIn(m_, first)]);
+    }
     return values_;
   }
 
@@ -94,7 +108,7 @@ class Features {
       return 1;
     }
     const int radius = (m_.core - 1) / 2;
-    const float* q = m_.FactorMap(0, m_.terms);
+    const float* q = m_.FactorMap(0, m_.MapCount() - 1);
     const std::size_t there =
         IndexIn(m_, {point_.x + cell.x - radius, point_.y + cell.y - radius});
     const std::int64_t index = std::int64_t{cell.y} * m_.core + cell.x;
@@ -139,9 +153,9 @@ class WindowFeatures {
   WindowFeatures(const Material& m, GridIndex point)
       : m_(m),
         size_(static_cast<std::size_t>(m.WindowSize())),
-        values_(
-            size_ * static_cast<std::size_t>(ReciprocalKernelCount(m.terms, m.taps)),
-            0.0) {
+        values_(size_ * static_cast<std::size_t>(
+                            ReciprocalKernelCount(m.terms, m.taps) + m.rest),
+                0.0) {
     const int radius = (m.core - 1) / 2;
     const std::size_t here = IndexIn(m, {point.x, point.y});
     std::fill_n(values_.begin(), size_, 1.0);
@@ -180,12 +194,19 @@ class WindowFeatures {
         }
       }
     }
+    for (int k = 0; k < m.rest; ++k) {
+      const float* u = m.FactorMap(0, m.terms + k);
+      for (std::size_t n = 0; n < size_; ++n) {
+        const bool is_first = IsFirst(m, static_cast<std::int64_t>(n));
+        *pair++ = static_cast<double>(u[is_first ? here : there[n]]);
+      }
+    }
   }
 
   void Sum(int channel, double* s) const {
     std::fill_n(s, size_, 0.0);
     const std::size_t half = (size_ + 1) / 2;
-    const int count = ReciprocalKernelCount(m_.terms, m_.taps);
+    const int count = ReciprocalKernelCount(m_.terms, m_.taps) + m_.rest;
     std::vector<float> mirrored(half - 1);
     for (int k = 0; k < count; ++k) {
       const float* kernel = m_.Kernel(channel, 0, k);

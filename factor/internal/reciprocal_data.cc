@@ -15,7 +15,10 @@ constexpr double kFaintest = 1e-5;   // peaks
 constexpr double kSidesBytes =
     12 * 4 * 4;                     // near offsets, values and weights both ways
 constexpr double kMostPairs = 2e7;  // more take minutes, and tell no more of the maps
-constexpr double kPlanesAPair = 3 * 4;  // values, weights, linearised weights: floats
+// Values and weights, and linearised weights or what FitRest holds: floats.
+double BytesAPair(const ReciprocalLimits& limits) {
+  return limits.rest ? 4 * 4 : 3 * 4;
+}
 
 double PlaneSize(const reconstruct::RdHeader& header) {
   return (header.points_x + header.core - 1.0) * (header.points_y + header.core - 1.0);
@@ -27,10 +30,10 @@ std::size_t CellCount(const reconstruct::RdHeader& header) {
 
 std::size_t HeldCount(const reconstruct::RdHeader& header,
                       const ReciprocalLimits& limits) {
-  const double a_cell =
-      kPlanesAPair * PlaneSize(header) * static_cast<double>(header.channels.size());
+  const double a_cell = BytesAPair(limits) * PlaneSize(header) *
+                        static_cast<double>(header.channels.size());
   const double fitting =
-      std::min(limits.memory_bytes, kMostPairs * kPlanesAPair) / a_cell;
+      std::min(limits.memory_bytes, kMostPairs * BytesAPair(limits)) / a_cell;
   return static_cast<std::size_t>(
       std::clamp(fitting, 1.0, static_cast<double>(CellCount(header))));
 }
@@ -205,7 +208,7 @@ double ReciprocalBytes(const reconstruct::RdHeader& header,
   const double sample =
       held < cells ? cells * channels * 8 * (limits.sample_pairs + 1) : 0;
   const double sides = limits.sides ? kSidesBytes * PlaneSize(header) * channels : 0;
-  return kPlanesAPair * PlaneSize(header) * channels * held + sample + sides;
+  return BytesAPair(limits) * PlaneSize(header) * channels * held + sample + sides;
 }
 
 ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {

@@ -91,6 +91,7 @@ struct ReciprocalLimits {
   double memory_bytes = 1e9;
   double tail_weight = 1;
   bool sides = false;  ///< whether to look for them
+  bool rest = false;   ///< the same
 };
 
 ReciprocalLimits LimitsOf(const FactorOptions& options);

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reciprocal_fit.h"
+#include "factor/internal/reciprocal_rest.h"
 #include "factor/internal/reciprocal_sides.h"
 #include "factor/internal/reciprocal_taps.h"
 
@@ -27,23 +28,22 @@ class ReciprocalMethod final : public Method {
                                             job_.options.taps,
                                             job_.options.thread_count,
                                             job_.progress);
+    const ReciprocalRest rest =
+        job_.options.rest > 0
+            ? FitRest(data_, fit, job_.options.rest, job_.options.thread_count)
+            : ReciprocalRest{};
     Material m = EmptyMaterial(job_.source.header());
     m.form = Form::kReciprocal;
+    m.rest = static_cast<int>(rest.u.rows());
     m.terms = terms;
     m.taps = job_.options.taps;
     m.margin = data_.margin;
     m.a = data_.scale;
     m.f.assign(fit.f.data(), fit.f.data() + fit.f.size());
-    const auto size = static_cast<std::size_t>(m.KernelSize());
+    m.f.insert(m.f.end(), rest.u.data(), rest.u.data() + rest.u.size());
     for (std::size_t c = 0; c < data_.channels; ++c) {
-      for (int k = 0; k < ReciprocalKernelCount(m.terms, m.taps); ++k) {
-        for (std::size_t cell = 0; cell < size; ++cell) {
-          const auto window = static_cast<std::size_t>(m.WindowSize());
-          const std::size_t n = std::min(cell, window - 1 - cell);
-          m.h.push_back(static_cast<float>(
-              fit.h(k, static_cast<Eigen::Index>(c * data_.cells + n))));
-        }
-      }
+      AddKernels(fit.h, c, m);
+      AddKernels(rest.v, c, m);
     }
     AddSides(job_, data_, m);
     return m;
@@ -66,6 +66,19 @@ class ReciprocalMethod final : public Method {
   }
 
  private:
+  // Rows of `kernels`, whose columns are cells of the first half of the window.
+  void AddKernels(const Eigen::MatrixXd& kernels, std::size_t channel, Material& m) {
+    const auto size = static_cast<std::size_t>(m.KernelSize());
+    const auto window = static_cast<std::size_t>(m.WindowSize());
+    for (Eigen::Index k = 0; k < kernels.rows(); ++k) {
+      for (std::size_t cell = 0; cell < size; ++cell) {
+        const std::size_t n = std::min(cell, window - 1 - cell);
+        m.h.push_back(static_cast<float>(
+            kernels(k, static_cast<Eigen::Index>(channel * data_.cells + n))));
+      }
+    }
+  }
+
   Job& job_;
   ReciprocalData data_;
   SharedMaps start_;
@@ -79,7 +92,8 @@ ReciprocalLimits LimitsOf(const FactorOptions& options) {
           .sample_pairs = std::clamp(24 * kernels, 3000, 20000),
           .memory_bytes = options.memory_mb * 1e6,
           .tail_weight = options.tail_weight,
-          .sides = options.sides > 0};
+          .sides = options.sides > 0,
+          .rest = options.rest > 0};
 }
 
 std::unique_ptr<Method> MakeReciprocalMethod(Job& job) {

@@ -215,7 +215,7 @@ TEST(MaterialFile, OtherFilesAreNamed) {
   EXPECT_THAT(ReadComplaint(folder / "picture.exr"), HasSubstr("is not a material"));
   WriteMaterial(folder / "m.nacre.exr", MakeMaterial(9));
   std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
-  parts[0].attributes["nacre.version"] = "5";
+  parts[0].attributes["nacre.version"] = "6";
   WriteExr(folder / "newer.exr", parts);
   EXPECT_THAT(ReadComplaint(folder / "newer.exr"), HasSubstr("newer nacre"));
 }

@@ -1,5 +1,6 @@
-// Light that enters at a point and leaves from a cell: what the reciprocal model stores
-// beside R_d to tell the two directions apart.
+// What the reciprocal model stores beside maps at points: sides, which tell the two
+// directions apart (light enters at a point and leaves from a cell), and the rest,
+// which tells pairs apart whose points are alike.
 
 #include "core/error.h"
 #include "core/random.h"
@@ -10,6 +11,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 namespace nacre::factor {
@@ -145,6 +147,78 @@ TEST(ReciprocalSides, OnlyTheReciprocalFormHasThem) {
   Material m = nacre::testing::MakeMaterial(4);
   m.sides = 1;
   EXPECT_THROW(Validate(m, "a material"), Error);
+  m.sides = 0;
+  m.rest = 1;
+  EXPECT_THROW(Validate(m, "a material"), Error);
+}
+
+// A reciprocal dataset in which what goes between neighbours side by side is changed by
+// something that neither of them knows of.
+RdDataset WithSomethingBetween() {
+  RdDataset dataset = MakePair().symmetric;
+  const reconstruct::RdHeader& h = dataset.header;
+  RandomStream random(11, 0);
+  std::vector<float> between;
+  for (std::int64_t p = 0; p < h.PointCount(); ++p) {
+    between.push_back(static_cast<float>(std::exp(3 * (random.Uniform() - 0.5))));
+  }
+  const std::int64_t middle = h.WindowSize() / 2;
+  for (std::int64_t n = 0; n < std::ssize(dataset.rd); ++n) {
+    const std::int64_t point = n / h.SliceSize();
+    const std::int64_t cell = n % h.WindowSize();
+    const std::int64_t first = cell == middle - 1 ? point : point + 1;
+    if ((cell == middle - 1 && point % h.points_x > 0) ||
+        (cell == middle + 1 && first % h.points_x > 0)) {
+      dataset.rd[static_cast<std::size_t>(n)] *=
+          between[static_cast<std::size_t>(first)];
+    }
+  }
+  return dataset;
+}
+
+TEST(ReciprocalRest, WhatIsBetweenPointsIsFoundAndTheSameBothWays) {
+  const RdDataset dataset = WithSomethingBetween();
+  FactorOptions options = Options(0);
+  options.bits = 32;
+  const double without = ErrorOf(dataset, Factor(dataset, options).material);
+  options.rest = 2;
+  const Material m = Factor(dataset, options).material;
+  ASSERT_GE(m.rest, 1);
+  EXPECT_LT(ErrorOf(dataset, m), 0.2 * without);
+  ExpectSameBothWays(m);
+  std::vector<float> window(static_cast<std::size_t>(m.WindowSize()));
+  m.EvaluateWindow(1, 7, 8, window.data());
+  for (std::size_t n = 0; n < window.size(); ++n) {
+    EXPECT_GT(window[n], 0);
+    EXPECT_EQ(window[n],
+              m.Evaluate(
+                  1, 7, 8, static_cast<int>(n) % m.core, static_cast<int>(n) / m.core));
+  }
+  const TempFolder folder;
+  WriteMaterial(folder.path() / "m.nacre.exr", m);
+  const Material read = ReadMaterial(folder.path() / "m.nacre.exr");
+  EXPECT_EQ(read.rest, m.rest);
+  EXPECT_EQ(read.f, m.f);
+  EXPECT_EQ(read.h, m.h);
+  options.thread_count = 1;
+  EXPECT_EQ(Factor(dataset, options).material.f, m.f);
+}
+
+TEST(ReciprocalRest, NoiseAloneIsNotKept) {
+  RdDataset dataset = MakePair().symmetric;
+  RandomStream random(12, 0);
+  const float peak = *std::max_element(dataset.rd.begin(), dataset.rd.end());
+  dataset.sigma.resize(dataset.rd.size());
+  for (std::size_t n = 0; n < dataset.rd.size(); ++n) {
+    const float sigma = 0.02F * std::sqrt(dataset.rd[n] * peak);
+    dataset.sigma[n] = sigma;
+    // Uniform, of variance 1.
+    dataset.rd[n] +=
+        sigma * static_cast<float>(std::sqrt(12.0) * (random.Uniform() - 0.5));
+  }
+  FactorOptions options = Options(0);
+  options.rest = 12;
+  EXPECT_LE(Factor(dataset, options).material.rest, 1);
 }
 
 }  // namespace
