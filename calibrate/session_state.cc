@@ -1,15 +1,18 @@
 #include "calibrate/session_state.h"
 
+#include "acquire/read_ahead.h"
 #include "calibrate/dark.h"
 #include "calibrate/internal/power_drift.h"
 #include "calibrate/internal/sample_plane.h"
 #include "calibrate/rate_picture.h"
 #include "core/error.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 namespace nacre::calibrate {
@@ -95,7 +98,8 @@ void Warn(const SessionState& state, double across_px, std::vector<Warning>& war
 
 SessionState ExamineSession(const acquire::SessionReader& session,
                             const Calibration& calibration,
-                            const ProgressFunction& progress) {
+                            const ProgressFunction& progress,
+                            int thread_count) {
   SessionState state;
   state.relative_flux.assign(static_cast<std::size_t>(session.schedule().size()), 1.0);
   const DarkResult dark{.level = calibration.dark,
@@ -111,22 +115,35 @@ SessionState ExamineSession(const acquire::SessionReader& session,
   std::vector<internal::Sighting> sightings;
   std::vector<internal::PatchSample> patch;
   const std::vector<std::int64_t> numbers = ShortPictures(session);
-  for (std::size_t k = 0; k < numbers.size(); ++k) {
-    const acquire::Frame frame = session.ReadFrame(numbers[k]);
-    const std::vector<float> rates =
-        pictures.Rates(frame, session.schedule()[numbers[k]].channel);
-    internal::AddSightings(session, calibration, frame, rates, numbers[k], sightings);
-    if (session.rig().targets.patch_mm) {
-      if (const auto sample =
-              internal::LookAtPatch(session, calibration, frame, rates, numbers[k])) {
-        patch.push_back(*sample);
+  acquire::ReadAhead ahead(session, numbers);
+  ahead.Allow(numbers.size());
+  std::vector<std::vector<internal::Sighting>> seen(numbers.size());
+  std::vector<std::optional<internal::PatchSample>> patches(numbers.size());
+  constexpr std::int64_t kAtOnce = 16;
+  for (std::int64_t begin = 0; begin < std::ssize(numbers); begin += kAtOnce) {
+    const std::int64_t count = std::min(kAtOnce, std::ssize(numbers) - begin);
+    ParallelFor(count, thread_count, [&](std::int64_t n) {
+      const auto k = static_cast<std::size_t>(begin + n);
+      const acquire::Frame frame = session.ReadFrame(numbers[k]);
+      const std::vector<float> rates =
+          pictures.Rates(frame, session.schedule()[numbers[k]].channel);
+      internal::AddSightings(session, calibration, frame, rates, numbers[k], seen[k]);
+      if (session.rig().targets.patch_mm) {
+        patches[k] =
+            internal::LookAtPatch(session, calibration, frame, rates, numbers[k]);
       }
-    }
+    });
     Report(progress,
            {.stage = "session",
-            .done = static_cast<std::int64_t>(k) + 1,
+            .done = begin + count,
             .total = std::ssize(numbers),
             .note = "sample"});
+  }
+  for (std::size_t k = 0; k < numbers.size(); ++k) {
+    sightings.insert(sightings.end(), seen[k].begin(), seen[k].end());
+    if (patches[k]) {
+      patch.push_back(*patches[k]);
+    }
   }
   double across_px = 0;
   for (const internal::Sighting& s : sightings) {

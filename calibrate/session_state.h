@@ -32,7 +32,8 @@ struct SessionState {
 /// there are no pictures of the sample yet.
 SessionState ExamineSession(const acquire::SessionReader& session,
                             const Calibration& calibration,
-                            const ProgressFunction& progress = {});
+                            const ProgressFunction& progress = {},
+                            int thread_count = 0);
 
 /// Where on the sample's surface a beam arrives that is aimed at a point of the sample
 /// plane, in the coordinates of CameraGeometry::OnPlane.

@@ -1,5 +1,6 @@
 #include "reconstruct/reconstruct.h"
 
+#include "acquire/read_ahead.h"
 #include "calibrate/session_state.h"
 #include "core/error.h"
 #include "core/hash.h"
@@ -181,9 +182,18 @@ void Measure(const GroupReader& reader,
   // Long enough that waiting for the last of a batch doesn't cost, short enough to
   // stop.
   const std::int64_t batch = 8 * at_once;
+  std::vector<std::int64_t> pictures;
+  std::vector<std::size_t> begins;  // of each group's
+  for (const int g : wanted) {
+    begins.push_back(pictures.size());
+    reader.AddPictures(g, pictures);
+  }
+  acquire::ReadAhead ahead(reader.session(), pictures);
   for (std::int64_t first = 0; first < total; first += batch) {
     Report(progress, {"reconstruct", first, total, "pictures"});
     const std::int64_t count = std::min(batch, total - first);
+    const auto later = static_cast<std::size_t>(first + 2 * batch);
+    ahead.Allow(later < begins.size() ? begins[later] : pictures.size());
     ParallelFor(count, at_once, [&](std::int64_t k) {
       const int g = wanted[static_cast<std::size_t>(first + k)];
       spool.Park(g, reader.StateOf(g), reader.Read(g));
@@ -265,7 +275,8 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   nacre::Validate(options);
   const auto start = std::chrono::steady_clock::now();
   CheckSameRig(session, of_rig, options.incremental);
-  calibrate::SessionState state = calibrate::ExamineSession(session, of_rig);
+  calibrate::SessionState state =
+      calibrate::ExamineSession(session, of_rig, {}, options.thread_count);
   state.plane = Settle(state.plane);
   calibrate::Calibration calibration = of_rig;
   calibration.camera = of_rig.camera.OnPlane(state.plane);

@@ -104,6 +104,13 @@ const std::vector<std::int64_t>& GroupReader::Pictures(int group, int channel) c
                                             channel)];
 }
 
+void GroupReader::AddPictures(int group, std::vector<std::int64_t>& numbers) const {
+  for (int c = 0; c < session_.rig().ChannelCount(); ++c) {
+    const std::vector<std::int64_t>& own = Pictures(group, c);
+    numbers.insert(numbers.end(), own.begin(), own.end());
+  }
+}
+
 bool GroupReader::IsThere(int group) const {
   bool there = true;
   for (int c = 0; c < session_.rig().ChannelCount(); ++c) {

@@ -54,6 +54,9 @@ class GroupReader {
   std::uint64_t StateOf(int group) const;
 
   GroupPicture Read(int group) const;
+  const acquire::SessionReader& session() const { return session_; }
+  /// Adds the numbers of the pictures that Read() reads, in that order.
+  void AddPictures(int group, std::vector<std::int64_t>& numbers) const;
 
   /// R_d of light that entered at grid point (i, j) of that group is this factor times
   /// the lattice's. The laser's power when the pictures were taken is in it.
