@@ -7,10 +7,12 @@
 #include "core/options_json.h"
 #include "core/png.h"
 #include "core/provenance.h"
+#include "render/tev.h"
 #include "render/tone.h"
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 namespace nacre::cli {
 namespace {
@@ -24,6 +26,7 @@ struct Arguments {
   bool stats = false;
   bool reference = false;
   std::filesystem::path checkpoint;
+  std::string tev;
   double exposure_ev = 0;
   render::RenderOptions options;
 };
@@ -49,6 +52,10 @@ void AddArguments(CLI::App& app, Arguments& arguments) {
                  arguments.checkpoint,
                  "keep all samples in this file every ten seconds; if it is there "
                  "already, go on from it");
+  app.add_option("--tev",
+                 arguments.tev,
+                 "HOST:PORT of a tev that shows the picture as it is made, every "
+                 "--snapshot seconds or every two; tev's own port is :14158");
   AddOptions(app, arguments.options);
 }
 
@@ -134,15 +141,34 @@ int Run(Arguments& arguments, const Common& common) {
       WriteImage(arguments.png, parts, arguments, provenance);
     }
   };
+  std::optional<render::TevDisplay> display;
+  const bool saves = options.snapshot_s > 0;
+  if (!arguments.tev.empty()) {
+    display.emplace(arguments.tev);
+    constexpr double kShowEvery = 2;
+    options.snapshot_s = saves ? options.snapshot_s : kShowEvery;
+  }
+  const auto show = [&](const ExrPart& image) {
+    if (display && !display->Show(arguments.out.filename().string(), image)) {
+      Say(common, "tev has gone; the picture goes on without it");
+      display.reset();
+    }
+  };
   const render::Rendering rendering =
       render::Render(scene,
                      options,
                      ConsoleProgress(common),
-                     [&](const ExrPart& image) { save({image}); },
+                     [&](const ExrPart& image) {
+                       show(image);
+                       if (saves) {
+                         save({image});
+                       }
+                     },
                      {arguments.checkpoint, IdentityOf(provenance)});
   std::vector<ExrPart> parts = rendering.aovs;
   parts.insert(parts.begin(), rendering.image);
   save(parts);
+  show(rendering.image);
   Json json = rendering.summary.ToJson();
   json["out"] = arguments.out.string();
   Print(common,

@@ -50,6 +50,8 @@ std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
   std::vector<Vec3> along_u(count);
   std::vector<Vec3> along_v(count);
   std::vector<Vec3> normals(count);
+  std::vector<Vec3> stretch(count);
+  std::vector<float> areas(count);
   for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
     const SurfaceHit hit =
         MeshPoint(shape, static_cast<std::uint32_t>(i), {1.0F / 3, 1.0F / 3});
@@ -58,6 +60,8 @@ std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
     for (const std::uint32_t vertex : mesh.triangles[i]) {
       along_u[vertex] += point.tangent_u * area;
       along_v[vertex] += point.tangent_v * area;
+      stretch[vertex] += point.stretch_mm * area;
+      areas[vertex] += area;
       normals[vertex] += hit.face_normal * area;
     }
   }
@@ -69,6 +73,7 @@ std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
     point.normal = Length(sum) > 0 ? Normalized(sum) : Vec3{0, 0, 1};
     point.uv = mesh.uvs.empty() ? Vec2{} : mesh.uvs[i];
     SetTangents(point, along_u[i], along_v[i]);
+    point.stretch_mm = areas[i] > 0 ? stretch[i] / areas[i] : Vec3{};
   }
   return points;
 }

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "render/exitances.h"
+#include "render/integrators/caustic_photons.h"
 #include "render/integrators/path.h"
 #include "render/sample_plan.h"
 #include "render/stopwatch.h"
@@ -16,15 +17,31 @@
 namespace nacre::render {
 namespace {
 
+// Whether photons can bring what this scene's glass and mirrors throw.
+void CheckPhotons(const Scene& scene, const RenderOptions& options) {
+  if (options.adaptive) {
+    throw UsageError(
+        "--adaptive doesn't go with sppm, of which each sample has photons of its own");
+  }
+  for (const Shape& shape : scene.shapes) {
+    if (shape.interior != nullptr || shape.exterior != nullptr) {
+      throw UsageError("sppm can't take photons through media (shape '" + shape.name +
+                       "'): use volpath");
+    }
+  }
+}
+
 IntegratorSettings ChooseIntegrator(const Scene& scene, const std::string& name) {
   IntegratorSettings settings = scene.integrator;
-  if (name == "path" || name == "fast" || name == "reference") {
+  settings.photons.enabled =
+      name == "sppm" || (name == "scene" && settings.photons.enabled);
+  if (name == "path" || name == "fast" || name == "reference" || name == "sppm") {
     settings.kind = IntegratorSettings::Kind::kPath;
   } else if (name == "direct") {
     settings.kind = IntegratorSettings::Kind::kDirect;
   } else if (name != "scene") {
     throw UsageError("no integrator '" + name +
-                     "': there are scene, path, direct, fast and reference");
+                     "': there are scene, path, direct, fast, sppm and reference");
   }
   return settings;
 }
@@ -219,6 +236,9 @@ Rendering Render(const Scene& scene,
                  const Checkpoint& checkpoint) {
   Validate(options);
   const IntegratorSettings settings = ChooseIntegrator(scene, options.integrator);
+  if (settings.photons.enabled) {
+    CheckPhotons(scene, options);
+  }
   const Stopwatch total;
   const CpuStopwatch cpu;
   Rendering rendering;
@@ -236,7 +256,9 @@ Rendering Render(const Scene& scene,
   DescribeScene(scene, world, summary);
   const Exitances exitances(world, settings, options, progress, summary);
 
-  const PathTracer tracer(world, exitances.sources(), settings);
+  PathTracer tracer(world, exitances.sources(), settings);
+  const CausticPhotons caustics(world, settings.photons, settings.max_depth);
+  PhotonMap photons;
   const SamplePlan plan(scene.film,
                         {.spp = SamplesAtMost(scene, options),
                          .error_target = options.error_target,
@@ -247,9 +269,17 @@ Rendering Render(const Scene& scene,
   std::int64_t made = made_before;
   std::mutex report_mutex;
   for (std::vector<int> next = plan.Next(film); !next.empty(); next = plan.Next(film)) {
+    if (settings.photons.enabled) {
+      // A map for each sample of the pixels.
+      std::fill(next.begin(), next.end(), static_cast<int>(film.SamplesMade(0)) + 1);
+    }
     if (!schedule.TimeLeft(made - made_before, plan.SamplesUpTo(next) - made)) {
       summary.time_ran_out = true;
       break;
+    }
+    if (settings.photons.enabled) {
+      photons = caustics.Map(film.SamplesMade(0), options.seed, options.thread_count);
+      tracer.UsePhotons(&photons);
     }
     pass.Run(
         next,

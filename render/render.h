@@ -37,8 +37,9 @@ struct RenderOptions {
           self.integrator,
           Range{},
           "scene (what the file says), path, direct, fast: path tracing with "
-          "translucency gathered from lit points; reference: the same without bias, "
-          "every sample looking for light of its own");
+          "translucency gathered from lit points; sppm: the same with caustics by "
+          "photons; reference: as fast without bias, every sample looking for light of "
+          "its own");
     visit("time_limit",
           self.time_limit_s,
           Range{0, 1e9},

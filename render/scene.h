@@ -5,6 +5,7 @@
 #include "render/light.h"
 #include "render/shape.h"
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -12,12 +13,21 @@
 
 namespace nacre::render {
 
+/// Progressive photon mapping of what glass and mirrors throw on other surfaces.
+struct PhotonSettings {
+  bool enabled = false;
+  std::int64_t count = 250'000;  ///< light paths a map; a sample of each pixel has one
+  float initial_radius = 0;      ///< scene units; 0: by the scene's size
+  float alpha = 0.7F;            ///< 1: the radius stays
+};
+
 struct IntegratorSettings {
   enum class Kind { kPath, kDirect };
   Kind kind = Kind::kPath;
   int max_depth = -1;          ///< edges of a path from camera to light; −1: no limit
   int rr_depth = 5;            ///< from this depth on paths may end by Russian roulette
   bool hide_emitters = false;  ///< lights aren't seen directly
+  PhotonSettings photons{};
 };
 
 /// All that is in a scene file, ready to render. Lengths in scene units.

@@ -46,9 +46,10 @@ bool SphereTangents(const SurfaceHit& hit, Vec3& dpdu, Vec3& dpdv) {
   if (!(around > 1e-6F * sphere.radius)) {
     return false;  // a pole
   }
-  dpdu = sphere.axes.ToWorld({-local.y, local.x, 0});
+  dpdu = sphere.axes.ToWorld({-local.y, local.x, 0}) * (2 * kPi);
   dpdv = sphere.axes.ToWorld(
-      {-local.x * local.z / around, -local.y * local.z / around, around});
+             {-local.x * local.z / around, -local.y * local.z / around, around}) *
+         kPi;
   return true;
 }
 
@@ -145,8 +146,13 @@ SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit) {
   const bool mesh = std::holds_alternative<TriangleMesh>(hit.shape->geometry);
   if (!(mesh ? MeshTangents(hit, dpdu, dpdv) : SphereTangents(hit, dpdu, dpdv))) {
     dpdu = {};
+    dpdv = {};
   }
   SetTangents(point, dpdu, dpdv);
+  point.stretch_mm = Vec3{Dot(dpdu, point.tangent_u),
+                          Dot(dpdv, point.tangent_u),
+                          Dot(dpdv, point.tangent_v)} *
+                     mm_per_unit;
   return point;
 }
 

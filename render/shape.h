@@ -31,6 +31,10 @@ struct Translucency {
   float mm_per_unit = 1;        ///< millimetres of the material a scene unit
   bool indirect = true;         ///< gathers indirect light too (`irrIndirect`)
   int irradiance_samples = 16;  ///< a patch (`irrSamples`)
+  /// What exitances are times where they are seen; null: 1. Sharp, where exitances are
+  /// interpolated.
+  TexturePtr exit_scale{};
+  float core_mm = 0;  ///< of a measured material: what a lit point reaches
 };
 
 struct Shape {
@@ -82,10 +86,6 @@ float SurfaceOffset(const Sphere& sphere);
 /// The hit as models of translucency want it: in millimetres, with tangents along u and
 /// v made orthonormal to the shading normal. Without usable uv, some frame.
 SurfacePoint ToSurfacePoint(const SurfaceHit& hit, float mm_per_unit);
-
-/// The tangents of a point with a normal, from sums along u and v of any length.
-/// Without usable ones, some frame.
-void SetTangents(SurfacePoint& point, Vec3 along_u, Vec3 along_v);
 
 /// Points uniform in area over a shape.
 class AreaSampler {

@@ -17,9 +17,34 @@ class ConstantTexture : public Texture {
   Color At(Vec2) const override { return value_; }
   Color Mean() const override { return value_; }
   Color Max() const override { return value_; }
+  bool IsConstant() const override { return true; }
 
  private:
   Color value_;
+};
+
+class ProductTexture : public Texture {
+ public:
+  ProductTexture(TexturePtr a, TexturePtr b) : a_(std::move(a)), b_(std::move(b)) {}
+  Color At(Vec2 uv) const override { return a_->At(uv) * b_->At(uv); }
+  Color Mean() const override { return a_->Mean() * b_->Mean(); }
+  Color Max() const override { return a_->Max() * b_->Max(); }
+  float Aspect() const override { return a_->Aspect(); }
+
+ private:
+  TexturePtr a_;
+  TexturePtr b_;
+};
+
+class ComplementTexture : public Texture {
+ public:
+  explicit ComplementTexture(TexturePtr a) : a_(std::move(a)) {}
+  Color At(Vec2 uv) const override { return Color{1, 1, 1} - a_->At(uv); }
+  Color Mean() const override { return Color{1, 1, 1} - a_->Mean(); }
+  Color Max() const override { return {1, 1, 1}; }
+
+ private:
+  TexturePtr a_;
 };
 
 class CheckerboardTexture : public Texture {
@@ -125,6 +150,20 @@ class BitmapTexture : public Texture {
 
 TexturePtr MakeConstant(Color value) {
   return std::make_shared<ConstantTexture>(value);
+}
+
+TexturePtr MakeProduct(TexturePtr a, TexturePtr b) {
+  if (a->IsConstant() && b->IsConstant()) {
+    return MakeConstant(a->Mean() * b->Mean());
+  }
+  return std::make_shared<ProductTexture>(std::move(a), std::move(b));
+}
+
+TexturePtr MakeComplement(TexturePtr a) {
+  if (a->IsConstant()) {
+    return MakeConstant(Color{1, 1, 1} - a->Mean());
+  }
+  return std::make_shared<ComplementTexture>(std::move(a));
 }
 
 TexturePtr MakeCheckerboard(Color color0, Color color1, const UvMap& map) {

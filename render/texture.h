@@ -18,6 +18,7 @@ class Texture {
   virtual Color Max() const = 0;
   /// Width / height of the picture, if it is one.
   virtual float Aspect() const { return 1; }
+  virtual bool IsConstant() const { return false; }
 };
 using TexturePtr = std::shared_ptr<const Texture>;
 
@@ -42,6 +43,11 @@ struct Bitmap {
 };
 
 TexturePtr MakeConstant(Color value);
+
+/// a · b, a channel.
+TexturePtr MakeProduct(TexturePtr a, TexturePtr b);
+/// 1 − a.
+TexturePtr MakeComplement(TexturePtr a);
 
 /// Two checks along each axis of the unit square, as in Mitsuba: `color0` where
 /// ⌊2u⌋ + ⌊2v⌋ is even.

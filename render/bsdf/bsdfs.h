@@ -51,6 +51,11 @@ BsdfPtr MakeDielectric(const DielectricParameters& parameters);
 BsdfPtr MakeRoughDielectric(const DielectricParameters& parameters,
                             const Microfacet& facets);
 
+/// What a translucent surface is where light doesn't spread in it: it leaves where it
+/// entered, f = A F_t(θ_i) F_t(θ_o) / (π c(η)); under what `coat` reflects (null:
+/// nothing). Where A is 0, the coat alone.
+BsdfPtr MakeLocalTranslucency(BsdfPtr coat, TexturePtr albedo, float eta);
+
 /// The front of `front` on both sides.
 BsdfPtr MakeTwoSided(BsdfPtr front);
 

@@ -2,6 +2,7 @@
 
 #include "core/fresnel.h"
 #include "render/bsdf/fresnel.h"
+#include "render/integrators/caustic_photons.h"
 #include "render/integrators/path_state.h"
 
 #include <cmath>
@@ -86,7 +87,7 @@ void PathTracer::Trace(State& state) const {
       }
     }
     if (!found) {
-      if (state.count_emission) {
+      if (CountsEmission(state)) {
         const float other =
             state.delta ? 0 : world_.BackgroundPdf(state.side, state.ray.direction);
         const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
@@ -102,7 +103,7 @@ void PathTracer::Trace(State& state) const {
     }
     state.alpha = 1;
     const Vec3 to_viewer = -state.ray.direction;
-    if (state.count_emission && hit.shape->radiance) {
+    if (hit.shape->radiance && CountsEmission(state)) {
       const float other = state.delta ? 0 : world_.EmissionPdf(hit, state.origin);
       const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
       state.radiance += state.throughput * world_.Emission(hit, to_viewer) * weight;
@@ -118,11 +119,28 @@ void PathTracer::Trace(State& state) const {
     const Vec3 wo = frame.ToLocal(to_viewer);
     if (!hit.shape->bsdf->IsDelta()) {
       AddDirectLight(state, hit, frame, wo);
+      AddPhotons(state, hit, frame, wo);
     }
     if (!Continue(state, hit, frame, wo)) {
       return;
     }
   }
+}
+
+bool PathTracer::CountsEmission(const State& state) const {
+  const bool by_photons = photons_ != nullptr && state.from_shown && state.carried;
+  return state.count_emission && !by_photons;
+}
+
+void PathTracer::AddPhotons(State& state,
+                            const SurfaceHit& hit,
+                            const Frame& frame,
+                            Vec3 wo) const {
+  if (photons_ == nullptr) {
+    return;
+  }
+  const int most = state.max_depth < 0 ? -1 : state.max_depth - state.depth;
+  state.radiance += state.throughput * photons_->Radiance(hit, frame, wo, most);
 }
 
 void PathTracer::AddDirectLight(State& state,
@@ -188,6 +206,8 @@ bool PathTracer::Continue(State& state,
     return false;
   }
   state.delta = sample.delta;
+  state.carried = CarriesPhotons(*hit.shape);
+  state.from_shown = state.carried ? state.from_shown : !sample.delta;
   if (!sample.delta && sample.pdf <= kSharpPdf) {
     state.sight = Sight::kBlurred;
   } else if (state.sight == Sight::kSharp &&
@@ -213,8 +233,10 @@ Color PathTracer::TranslucentRadiance(State& state,
   const float cosine = std::min(1.0F, std::abs(Dot(hit.normal, to_viewer)));
   const float transmitted =
       1 - FresnelDielectric(cosine, hit.shape->translucency->model->Eta());
-  return exitances_[hit.shape_index]->At(hit,
-                                         {state.sampler, state.counters, state.sight}) *
+  const Color exitance = exitances_[hit.shape_index]->At(
+      hit, {state.sampler, state.counters, state.sight});
+  const TexturePtr& scale = hit.shape->translucency->exit_scale;
+  return (scale != nullptr ? exitance * scale->At(hit.uv) : exitance) *
          (transmitted * exit_scale_[hit.shape_index]);
 }
 

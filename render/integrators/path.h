@@ -8,6 +8,8 @@
 
 namespace nacre::render {
 
+class PhotonMap;
+
 /// A path tracer with light sampling, BSDF sampling and their combination by the power
 /// heuristic [Veach97, section 9.2.4].
 class PathTracer {
@@ -16,6 +18,10 @@ class PathTracer {
   PathTracer(const World& world,
              const ExitanceSources& exitances,
              const IntegratorSettings& settings);
+
+  /// From now on, light that goes by way of glass or mirrors to a diffuse surface is
+  /// taken from `photons` and nowhere else. Null: as before.
+  void UsePhotons(const PhotonMap* photons) { photons_ = photons; }
 
   struct Result {
     Color radiance;
@@ -33,6 +39,11 @@ class PathTracer {
 
  private:
   struct State;
+  bool CountsEmission(const State& state) const;
+  void AddPhotons(State& state,
+                  const SurfaceHit& hit,
+                  const Frame& frame,
+                  Vec3 wo) const;
   void Trace(State& state) const;
   void AddDirectLight(State& state,
                       const SurfaceHit& hit,
@@ -57,6 +68,7 @@ class PathTracer {
 
   const World& world_;
   const ExitanceSources& exitances_;
+  const PhotonMap* photons_ = nullptr;
   IntegratorSettings settings_;
   bool has_media_ = false;
   std::vector<float> exit_scale_;  ///< 1 / (π c(η)) a shape

@@ -1,17 +1,17 @@
-#include "render/jensen_media.h"
+#include "render/named_media.h"
 #include "render/scene_reader/objects.h"
 #include "render/volume_file.h"
 
 namespace nacre::render {
 namespace {
 
-float ReadPhase(Element& element) {
+float ReadPhase(Element& element, float otherwise) {
   const std::vector<Element> found = element.Objects("phase");
   if (found.size() > 1) {
     element.Fail("a medium has one phase function");
   }
   if (found.empty()) {
-    return 0;
+    return otherwise;
   }
   Element phase = found.front();
   const std::string type = phase.type();
@@ -63,11 +63,29 @@ VolumeGrid ReadVolume(Element volume, Transform& world_from_grid) {
   return grid;
 }
 
+// Of the channels that scatter.
+float MeanAsymmetry(const Coefficients& c) {
+  float sum = 0;
+  float count = 0;
+  for (int channel = 0; channel < 3; ++channel) {
+    if (c.sigma_s[channel] > 0) {
+      sum += c.g[channel];
+      ++count;
+    }
+  }
+  return count > 0 ? sum / count : 0;
+}
+
 MediumPtr ReadHomogeneous(Element& element) {
   const Coefficients c = ReadCoefficients(element);
   const float scale = ReadScale(element);
+  // One phase function serves all channels: with its mean g, scattering that keeps each
+  // channel's reduced coefficient.
+  const float g = MeanAsymmetry(c);
+  const bool own = element.node().child("phase");
+  const Color sigma_s = own ? c.sigma_s : c.sigma_s * (Color{1, 1, 1} - c.g) / (1 - g);
   return MakeHomogeneousMedium(
-      c.sigma_a * scale, c.sigma_s * scale, ReadPhase(element));
+      c.sigma_a * scale, sigma_s * scale, ReadPhase(element, g));
 }
 
 MediumPtr ReadHeterogeneous(Element& element) {
@@ -94,7 +112,7 @@ MediumPtr ReadHeterogeneous(Element& element) {
   }
   const float scale = ReadScale(element);
   p.sigma_t = {scale, scale, scale};
-  p.g = ReadPhase(element);
+  p.g = ReadPhase(element, 0);
   element.Ignore("method", "free paths are found by null collisions");
   return MakeGridMedium(p);
 }
@@ -111,26 +129,29 @@ Coefficients ReadCoefficients(Element& element) {
   }
   if (material) {
     const std::string name = element.String("material", "");
-    const auto medium = FindJensenMedium(name);
+    const auto medium = FindNamedMedium(name);
     if (!medium) {
-      element.FailAt("material",
-                     fmt::format("no medium '{}' in the table of Jensen et al. 2001{}",
-                                 name,
-                                 Suggestion(name, JensenMediumNames())));
+      element.FailAt(
+          "material",
+          fmt::format("no medium '{}' in the tables of Jensen et al. 2001 and "
+                      "Narasimhan et al. 2006{}",
+                      name,
+                      Suggestion(name, NamedMediaNames())));
     }
-    return {medium->sigma_s_prime_per_mm, medium->sigma_a_per_mm, medium->eta};
+    return {medium->sigma_s_per_mm, medium->sigma_a_per_mm, medium->eta, medium->g};
   }
   if (coefficients) {
     return {element.Spectrum("sigmaS", {0, 0, 0}),
             element.Spectrum("sigmaA", {0, 0, 0}),
-            std::nullopt};
+            std::nullopt,
+            {}};
   }
   const Color sigma_t = element.Spectrum("sigmaT", {0, 0, 0});
   const Color a = element.Spectrum("albedo", {0, 0, 0});
   if (MaxComponent(a) > 1) {
     element.FailAt("albedo", "an albedo above 1");
   }
-  return {sigma_t * a, sigma_t * (Color{1, 1, 1} - a), std::nullopt};
+  return {sigma_t * a, sigma_t * (Color{1, 1, 1} - a), std::nullopt, {}};
 }
 
 MediumPtr ReadMedium(Element element) {

@@ -24,8 +24,16 @@ struct Coefficients {
   Color sigma_s;
   Color sigma_a;
   std::optional<float> eta;  ///< of a medium named by `material`
+  Color g{};                 ///< of a medium named by `material`; else 0
 };
-/// In one of three ways: a medium of Jensen's table (its reduced scattering, a mm), σ_s
+/// The same as textures.
+struct TexturedCoefficients {
+  TexturePtr sigma_s;
+  TexturePtr sigma_a;
+};
+/// Nothing if none of them is a texture.
+std::optional<TexturedCoefficients> ReadTexturedCoefficients(Element& element);
+/// In one of three ways: a named medium (a mm), σ_s
 /// and σ_a, or σ_t and the albedo.
 Coefficients ReadCoefficients(Element& element);
 void ReadEmitter(Element element);
@@ -38,7 +46,8 @@ void ReadShapeGroup(Element element);
 void ReadInstance(Element element);
 void ReadSensor(Element element);
 void ReadIntegrator(Element element);
-Translucency ReadSubsurface(Element element);
+/// Makes the shape translucent, or diffuse where light doesn't spread.
+void ReadSubsurface(Element element, Shape& shape);
 
 /// The object that <ref id="…"> of `node` means.
 template <class Object>

@@ -1,5 +1,6 @@
 #include "core/atomic_file.h"
 #include "render/scene.h"
+#include "render/scene_reader/mapping.h"
 #include "render/scene_reader/objects.h"
 
 #include <algorithm>
@@ -140,6 +141,7 @@ void ReadScene(Document& document, const pugi::xml_node& root) {
   if (scene.shapes.empty()) {
     document.Note(root, "no shape: only the background will be seen");
   }
+  NoteSmallCores(document);
 }
 
 }  // namespace

@@ -196,6 +196,19 @@ void ReadCamera(Element& element, Scene& scene) {
   }
 }
 
+void ReadPhotons(Element& element, PhotonSettings& photons) {
+  photons.enabled = true;
+  const int count = element.Integer("photonCount", 250'000);
+  InRange(element, "photonCount", count, {1, 1e9});
+  photons.count = count;
+  photons.initial_radius = static_cast<float>(
+      InRange(element, "initialRadius", element.Float("initialRadius", 0), {0, 1e9}));
+  photons.alpha = static_cast<float>(
+      InRange(element, "alpha", element.Float("alpha", 0.7), {0, 1}));
+  element.Ignore("maxPasses", "a sample of the pixels is a pass");
+  element.Ignore("granularity", "photons are traced in blocks of their own");
+}
+
 }  // namespace
 
 void ReadSensor(Element element) {
@@ -224,7 +237,11 @@ void ReadIntegrator(Element element) {
   const std::string type = element.type();
   settings.hide_emitters = element.Boolean("hideEmitters", false);
   element.Ignore("strictNormals", "light never crosses the true surface");
-  if (type == "path" || type == "volpath" || type == "volpath_simple") {
+  const bool photons = type == "sppm" || type == "ppm";
+  if (photons) {
+    ReadPhotons(element, settings.photons);
+  }
+  if (photons || type == "path" || type == "volpath" || type == "volpath_simple") {
     settings.kind = IntegratorSettings::Kind::kPath;
     settings.max_depth = element.Integer("maxDepth", -1);
     settings.rr_depth = element.Integer("rrDepth", 5);
@@ -240,7 +257,8 @@ void ReadIntegrator(Element element) {
       element.Ignore(name, "one of each a sample of the pixel");
     }
   } else {
-    UnknownPlugin(element, {"path", "volpath", "volpath_simple", "direct"});
+    UnknownPlugin(element,
+                  {"path", "volpath", "volpath_simple", "direct", "sppm", "ppm"});
     return;
   }
   element.Finish();

@@ -1,6 +1,7 @@
 #include "render/obj.h"
 #include "render/ply.h"
 #include "render/scene_reader/objects.h"
+#include "render/serialized.h"
 
 #include <algorithm>
 #include <cmath>
@@ -38,8 +39,14 @@ TriangleMesh ReadMeshFile(Element& element, const std::string& type) {
     element.Fail("a mesh needs a <string name=\"filename\">");
   }
   const std::filesystem::path path = element.document().File(element.node(), name);
-  TriangleMesh mesh = type == "obj" ? ReadObj(path) : ReadPly(path);
-  if (element.Boolean("faceNormals", false)) {
+  SerializedMesh read;
+  if (type == "serialized") {
+    read = ReadSerialized(path, element.Integer("shapeIndex", 0));
+  } else {
+    read.mesh = type == "obj" ? ReadObj(path) : ReadPly(path);
+  }
+  TriangleMesh mesh = std::move(read.mesh);
+  if (element.Boolean("faceNormals", read.face_normals)) {
     mesh.normals.clear();
   } else if (mesh.normals.empty()) {
     ComputeNormals(mesh);
@@ -141,8 +148,15 @@ Shape Transformed(const Element& element, Shape shape, const Transform& to_world
 
 std::optional<Shape> MakeShape(Element element) {
   const std::string type = element.type();
-  const std::vector<std::string> known = {
-      "obj", "ply", "sphere", "rectangle", "disk", "cube", "shapegroup", "instance"};
+  const std::vector<std::string> known = {"obj",
+                                          "ply",
+                                          "serialized",
+                                          "sphere",
+                                          "rectangle",
+                                          "disk",
+                                          "cube",
+                                          "shapegroup",
+                                          "instance"};
   if (std::find(known.begin(), known.end() - 2, type) == known.end() - 2) {
     UnknownPlugin(element, known);
     return std::nullopt;
@@ -165,7 +179,7 @@ std::optional<Shape> MakeShape(Element element) {
     if (shape.translucency) {
       element.Fail("a shape has one subsurface model");
     }
-    shape.translucency = ReadSubsurface(child);
+    ReadSubsurface(child, shape);
   }
   shape.interior = ReadMediumOr(element, "interior");
   shape.exterior = ReadMediumOr(element, "exterior");

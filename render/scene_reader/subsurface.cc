@@ -1,6 +1,8 @@
 #include "factor/material.h"
 #include "render/preset_path.h"
+#include "render/scene_reader/mapping.h"
 #include "render/scene_reader/objects.h"
+#include "render/scene_reader/textured_media.h"
 #include "render/subsurface/analytic_profiles.h"
 #include "render/subsurface/models.h"
 #include "render/subsurface/radial_model.h"
@@ -31,7 +33,8 @@ DipoleParameters ReadDipole(Element& element) {
   DipoleParameters p;
   const double g = InRange(element, "g", element.Float("g", 0), {-0.999, 0.999});
   const Coefficients c = ReadCoefficients(element);
-  p.sigma_s_prime_per_mm = c.eta ? c.sigma_s : Reduced(c.sigma_s, g);
+  p.sigma_s_prime_per_mm =
+      c.eta ? c.sigma_s * (Color{1, 1, 1} - c.g) : Reduced(c.sigma_s, g);
   p.sigma_a_per_mm = c.sigma_a;
   p.eta = c.eta.value_or(p.eta);
   const double inside = element.Has("intIOR")
@@ -88,7 +91,9 @@ std::filesystem::path FindMaterial(Element& element, const std::string& name) {
 }
 
 std::shared_ptr<const SubsurfaceModel> ReadMeasured(Element& element,
+                                                    const Shape& shape,
                                                     Translucency& translucency) {
+  const SampleOnSurface mapping = ReadMapping(element, shape, translucency.mm_per_unit);
   translucency.name = element.String("material", "");
   if (translucency.name.empty()) {
     element.Fail(
@@ -97,27 +102,31 @@ std::shared_ptr<const SubsurfaceModel> ReadMeasured(Element& element,
   }
   const std::filesystem::path path = FindMaterial(element, translucency.name);
   element.document().scene.files.push_back(path);
-  if (path.string().ends_with(".rd.exr")) {
-    return MakeMeasured(OpenDatasetSource(path));
-  }
-  return MakeFactored(
-      std::make_shared<const factor::Material>(factor::ReadMaterial(path)));
+  const auto source = path.string().ends_with(".rd.exr")
+                          ? OpenDatasetSource(path)
+                          : MakeMaterialSource(std::make_shared<const factor::Material>(
+                                factor::ReadMaterial(path)));
+  translucency.core_mm = static_cast<float>(source->core * source->pitch_mm);
+  NoteScale(element, shape, translucency, *source, mapping.mapping);
+  return MakeMeasured(source, {}, mapping);
 }
 
 }  // namespace
 
-Translucency ReadSubsurface(Element element) {
+void ReadSubsurface(Element element, Shape& shape) {
   Translucency translucency;
   const std::string type = element.type();
   ReadCommon(element, translucency);
   const std::vector<std::string> analytic = {
       "dipole", "betterdipole", "multipole", "normalizeddiffusion"};
   if (type == "svd") {
-    translucency.model = ReadMeasured(element, translucency);
+    translucency.model = ReadMeasured(element, shape, translucency);
   } else if (std::find(analytic.begin(), analytic.end(), type) != analytic.end()) {
     translucency.name = element.String("material", type);
     try {
-      translucency.model = ReadAnalytic(element, type);
+      if (!ReadTexturedModel(element, type, shape, translucency)) {
+        translucency.model = ReadAnalytic(element, type);
+      }
     } catch (const Error& e) {
       // What the reader found has its line already; what the model found, not yet.
       if (e.code() == ExitCode::kUsage) {
@@ -132,7 +141,9 @@ Translucency ReadSubsurface(Element element) {
     element.Fail(fmt::format("no subsurface '{}'{}", type, Suggestion(type, known)));
   }
   element.Finish();
-  return translucency;
+  if (translucency.model != nullptr) {
+    shape.translucency = std::move(translucency);
+  }
 }
 
 }  // namespace nacre::render

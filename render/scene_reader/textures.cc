@@ -99,6 +99,29 @@ WrapMode ReadWrapMode(Element& element, const char* name, const std::string& mod
   return found->second;
 }
 
+// Another texture times a number or a colour.
+TexturePtr ReadScaled(Element& element) {
+  const bool number = element.node().find_child_by_attribute("float", "name", "scale");
+  const auto factor = static_cast<float>(number ? element.Float("scale", 1) : 1);
+  const Color color =
+      number ? Color{factor, factor, factor} : element.Spectrum("scale", {1, 1, 1});
+  if (!(std::min({color.x, color.y, color.z}) >= 0)) {
+    element.FailAt("scale", "a texture can't be scaled by less than 0");
+  }
+  std::vector<TexturePtr> found;
+  for (const Element& child : element.Objects("texture")) {
+    found.push_back(ReadTexture(child));
+  }
+  for (const Element& ref : element.Objects("ref")) {
+    found.push_back(FindById(
+        element.document(), ref.node(), element.document().textures, "texture"));
+  }
+  if (found.size() != 1) {
+    element.Fail("a scale texture holds one texture");
+  }
+  return MakeProduct(found.front(), MakeConstant(color));
+}
+
 TexturePtr ReadBitmap(Element& element) {
   BitmapOptions options;
   options.map = ReadUvMap(element);
@@ -150,8 +173,10 @@ TexturePtr ReadTexture(Element element) {
                                map);
   } else if (type == "bitmap") {
     texture = ReadBitmap(element);
+  } else if (type == "scale") {
+    texture = ReadScaled(element);
   } else {
-    UnknownPlugin(element, {"bitmap", "checkerboard"});
+    UnknownPlugin(element, {"bitmap", "checkerboard", "scale"});
     return MakeConstant({0.5F, 0.5F, 0.5F});
   }
   element.Finish();

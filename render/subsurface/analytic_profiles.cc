@@ -115,6 +115,11 @@ std::shared_ptr<const RadialProfile> MakeMultipole(const Medium& medium,
     const double shift = 2 * i * (thickness_mm + 2 * z_b);
     const double real = shift + z_r;
     const double image = shift - z_r - 2 * z_b;
+    // exp(−40) of what is nearest is below a double's digits.
+    constexpr double kGone = 40;
+    if (sigma_tr * std::min(std::abs(real), std::abs(image)) > kGone) {
+      continue;
+    }
     sources.push_back({std::abs(real), std::copysign(weight, real), 0});
     sources.push_back({std::abs(image), std::copysign(weight, -image), 0});
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 namespace nacre::render {
 namespace {
@@ -39,19 +40,25 @@ class FactoredGather final : public Subsurface {
  public:
   FactoredGather(std::shared_ptr<const MaterialWindows> windows,
                  std::vector<Patch> patches,
+                 const MaterialMapping& mapping,
                  const FactoredOptions& options)
       : windows_(std::move(windows)),
+        along_surface_(mapping.mapping() == Mapping::kTexture),
         tree_(std::move(patches)),
         per_mm_(1 / windows_->pitch_mm()),
         reach_mm_(std::numbers::sqrt2_v<float> * windows_->radius() *
                   windows_->pitch_mm()),
         max_relative_extent_(static_cast<float>(options.max_relative_extent)) {
     for (const Patch& patch : tree_.patches()) {
-      patches_.push_back(SourceOf(patch));
+      first_.push_back(std::ssize(sources_));
+      for (const SamplePlace& place : mapping.Places(patch.point)) {
+        sources_.push_back(SourceOf(patch, place));
+      }
     }
+    first_.push_back(std::ssize(sources_));
     for (const PatchTree::Node& node : tree_.nodes()) {
-      Source source = patches_[static_cast<std::size_t>(node.brightest)];
-      source.flux_w = ToLanes(FluxThroughBrightest(node));
+      Source source = SourcesOf(node.brightest).front();
+      source.flux_w = ToLanes(FluxThroughBrightest(node, source.window));
       source.variance = node.variance_mm2 * per_mm_ * per_mm_;
       nodes_.push_back(source);
     }
@@ -63,7 +70,14 @@ class FactoredGather final : public Subsurface {
     thread_local std::vector<Lookup> lookups;
     lookups.clear();
     const auto add_patch = [&](std::int32_t index, Vec3 d_mm) {
-      AddPatch(patches_[static_cast<std::size_t>(index)], d_mm, lookups);
+      for (const Source& source : SourcesOf(index)) {
+        const SurfacePoint& x_i =
+            tree_.patches()[static_cast<std::size_t>(index)].point;
+        AddPatch(source,
+                 along_surface_ ? OnSurface(MaterialMapping::AlongSurface(x_i, x_o))
+                                : Project(d_mm, source),
+                 lookups);
+      }
     };
     tree_.Visit(
         x_o.position_mm,
@@ -71,7 +85,8 @@ class FactoredGather final : public Subsurface {
         tree_.SmallerThan(max_relative_extent_),
         [&](std::int32_t index, Vec3 d_mm) {
           const Source& node = nodes_[static_cast<std::size_t>(index)];
-          if (!AddCluster(node, d_mm, lookups)) {
+          // Texture coordinates have no mean: there may be a seam in between.
+          if (along_surface_ || !AddCluster(node, d_mm, lookups)) {
             tree_.VisitPatches(index, x_o.position_mm, add_patch);
           }
         },
@@ -113,29 +128,36 @@ class FactoredGather final : public Subsurface {
     float squared = 0;  ///< distance in space, squared
   };
 
-  Source SourceOf(const Patch& patch) const {
+  Source SourceOf(const Patch& patch, const SamplePlace& place) const {
     Source source;
-    source.flux_w = ToLanes(patch.flux_w);
-    source.column_axis = patch.point.tangent_u * per_mm_;
-    source.row_axis = -(patch.point.tangent_v * per_mm_);
+    source.flux_w = ToLanes(patch.flux_w * place.weight);
+    source.column_axis = place.tangent_u * per_mm_;
+    source.row_axis = -(place.tangent_v * per_mm_);
     const auto in_plane = [&](Vec3 v) {
       return Vec2{Dot(v, source.column_axis), Dot(v, source.row_axis)};
     };
     source.extent_a = in_plane(patch.axis_a_mm);
     source.extent_b = in_plane(patch.axis_b_mm);
-    source.window = windows_->WindowAt(patch.point.uv);
+    source.window = windows_->WindowAt(place.uv);
     return source;
   }
 
-  /// The flux that has to enter at the brightest patch of a node for what leaves to be
-  /// what its patches' albedos say.
-  Color FluxThroughBrightest(const PatchTree::Node& node) const {
-    const Color albedo =
-        windows_->Albedo(patches_[static_cast<std::size_t>(node.brightest)].window);
+  std::span<const Source> SourcesOf(std::int32_t patch) const {
+    const auto p = static_cast<std::size_t>(patch);
+    return {sources_.data() + first_[p], sources_.data() + first_[p + 1]};
+  }
+
+  /// The flux that has to enter through `window` for what leaves to be what the albedos
+  /// of a node's patches say.
+  Color FluxThroughBrightest(const PatchTree::Node& node, int window) const {
+    const Color albedo = windows_->Albedo(window);
     Color leaving;
     for (std::int32_t p = node.begin; p < node.end; ++p) {
-      const auto i = static_cast<std::size_t>(p);
-      leaving += tree_.patches()[i].flux_w * windows_->Albedo(patches_[i].window);
+      for (const Source& source : SourcesOf(p)) {
+        const ColorLanes& flux = source.flux_w;
+        leaving +=
+            Color{flux.v[0], flux.v[1], flux.v[2]} * windows_->Albedo(source.window);
+      }
     }
     const auto through = [](float out, float a, float plain) {
       return a > 0 ? out / a : plain;
@@ -143,6 +165,12 @@ class FactoredGather final : public Subsurface {
     return {through(leaving.x, albedo.x, node.flux_w.x),
             through(leaving.y, albedo.y, node.flux_w.y),
             through(leaving.z, albedo.z, node.flux_w.z)};
+  }
+
+  /// By a distance along the tangents at x_i.
+  Offset OnSurface(Vec2 d_mm) const {
+    const Vec2 plane{d_mm.x * per_mm_, -d_mm.y * per_mm_};
+    return {plane, plane.x * plane.x + plane.y * plane.y};
   }
 
   Offset Project(Vec3 d_mm, const Source& source) const {
@@ -162,8 +190,9 @@ class FactoredGather final : public Subsurface {
     }
   }
 
-  void AddPatch(const Source& source, Vec3 d_mm, std::vector<Lookup>& lookups) const {
-    const Offset d = Project(d_mm, source);
+  void AddPatch(const Source& source,
+                const Offset& d,
+                std::vector<Lookup>& lookups) const {
     if (d.squared > kNearPitches * kNearPitches) {
       Add(source, d.plane, d.squared, 1, lookups);
       return;
@@ -197,8 +226,10 @@ class FactoredGather final : public Subsurface {
   }
 
   std::shared_ptr<const MaterialWindows> windows_;
+  bool along_surface_;
   PatchTree tree_;
-  std::vector<Source> patches_;
+  std::vector<Source> sources_;
+  std::vector<std::ptrdiff_t> first_;  ///< of a patch, among the sources; and the end
   std::vector<Source> nodes_;
   float per_mm_;
   float reach_mm_;
@@ -207,8 +238,14 @@ class FactoredGather final : public Subsurface {
 
 class Factored final : public SubsurfaceModel {
  public:
-  Factored(std::shared_ptr<const WindowSource> source, const FactoredOptions& options)
+  Factored(std::shared_ptr<const WindowSource> source,
+           const FactoredOptions& options,
+           const SampleOnSurface& mapping)
       : windows_(std::make_shared<MaterialWindows>(source, options.window_cache_mb)),
+        mapping_(mapping.mapping,
+                 mapping.pose,
+                 static_cast<float>(source->points_x * source->pitch_mm),
+                 static_cast<float>(source->points_y * source->pitch_mm)),
         eta_(static_cast<float>(source->eta)),
         options_(options) {}
 
@@ -219,10 +256,17 @@ class Factored final : public SubsurfaceModel {
 
   Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const override {
     const Vec3 d = (x_o.position_mm - x_i.position_mm) / windows_->pitch_mm();
-    const Vec2 at =
-        InWindow({Dot(d, x_i.tangent_u), -Dot(d, x_i.tangent_v)}, Dot(d, d));
-    const ColorLanes rd = windows_->At(windows_->WindowAt(x_i.uv), at.x, at.y);
-    return {rd.v[0], rd.v[1], rd.v[2]};
+    ColorLanes sum;
+    for (const SamplePlace& place : mapping_.Places(x_i)) {
+      Vec2 at =
+          InWindow({Dot(d, place.tangent_u), -Dot(d, place.tangent_v)}, Dot(d, d));
+      if (mapping_.mapping() == Mapping::kTexture) {
+        const Vec2 along = MaterialMapping::AlongSurface(x_i, x_o);
+        at = {along.x / windows_->pitch_mm(), -along.y / windows_->pitch_mm()};
+      }
+      sum += windows_->At(windows_->WindowAt(place.uv), at.x, at.y) * place.weight;
+    }
+    return {sum.v[0], sum.v[1], sum.v[2]};
   }
 
   // The mean over some windows and directions.
@@ -262,11 +306,12 @@ class Factored final : public SubsurfaceModel {
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int /*thread_count*/) const override {
     return std::make_unique<FactoredGather>(
-        windows_, GatherPatches(lit, PatchSizeMm()), options_);
+        windows_, GatherPatches(lit, PatchSizeMm()), mapping_, options_);
   }
 
  private:
   std::shared_ptr<const MaterialWindows> windows_;
+  MaterialMapping mapping_;
   float eta_;
   FactoredOptions options_;
 };
@@ -274,15 +319,19 @@ class Factored final : public SubsurfaceModel {
 }  // namespace
 
 std::shared_ptr<const SubsurfaceModel> MakeMeasured(
-    std::shared_ptr<const WindowSource> source, const FactoredOptions& options) {
+    std::shared_ptr<const WindowSource> source,
+    const FactoredOptions& options,
+    const SampleOnSurface& mapping) {
   Expect(source != nullptr, "a measured subsurface model needs a source");
   Validate(options);
-  return std::make_shared<Factored>(std::move(source), options);
+  return std::make_shared<Factored>(std::move(source), options, mapping);
 }
 
 std::shared_ptr<const SubsurfaceModel> MakeFactored(
-    std::shared_ptr<const factor::Material> material, const FactoredOptions& options) {
-  return MakeMeasured(MakeMaterialSource(std::move(material)), options);
+    std::shared_ptr<const factor::Material> material,
+    const FactoredOptions& options,
+    const SampleOnSurface& mapping) {
+  return MakeMeasured(MakeMaterialSource(std::move(material)), options, mapping);
 }
 
 }  // namespace nacre::render

@@ -116,6 +116,18 @@ void SetAxes(Patch& patch, const Frame& frame, double a, double b, double c) {
   patch.axis_b_mm = frame.ToWorld({-v * shorter, u * shorter, 0});
 }
 
+/// Where a point would be whose texture coordinates went on evenly to `position_mm`.
+Vec2 UvAt(const SurfacePoint& from, Vec3 position_mm) {
+  const Vec3 stretch = from.stretch_mm;
+  if (!(std::abs(stretch.x) > 0 && stretch.z > 0)) {
+    return from.uv;
+  }
+  const Vec3 d = position_mm - from.position_mm;
+  const float dv = Dot(d, from.tangent_v) / stretch.z;
+  const float du = (Dot(d, from.tangent_u) - dv * stretch.y) / stretch.x;
+  return {from.uv.x + du, from.uv.y + dv};
+}
+
 const SurfacePoint& NearestMember(std::span<const KeyedPoint> members, Vec3 position) {
   const auto distance2 = [&](const KeyedPoint& k) {
     const Vec3 d = k.point->point.position_mm - position;
@@ -157,6 +169,7 @@ Patch MergePoints(std::span<const KeyedPoint> members) {
   const Vec3 position = to_vec(centre, 1 / weight_sum);
   Patch patch;
   patch.point = NearestMember(members, position);
+  patch.point.uv = UvAt(patch.point, position);
   patch.point.position_mm = position;
   patch.flux_w = to_vec(flux, 1);
   patch.area_mm2 = static_cast<float>(area);

@@ -2,6 +2,7 @@
 
 #include "core/options.h"
 #include "factor/material.h"
+#include "render/subsurface/material_mapping.h"
 #include "render/subsurface/subsurface.h"
 #include "render/subsurface/window_source.h"
 
@@ -72,15 +73,24 @@ struct FactoredOptions {
   }
 };
 
+/// How the sample lies on the surface.
+struct SampleOnSurface {
+  Mapping mapping = Mapping::kWorld;
+  SamplePose pose{};
+};
+
 /// R_d as measured, from wherever. One channel serves all three colours, three serve
 /// R, G, B in order; BadData for any other number.
 std::shared_ptr<const SubsurfaceModel> MakeMeasured(
-    std::shared_ptr<const WindowSource> source, const FactoredOptions& options = {});
+    std::shared_ptr<const WindowSource> source,
+    const FactoredOptions& options = {},
+    const SampleOnSurface& mapping = {});
 
 /// A measured, factored material (`<subsurface type="svd">`). One channel serves all
 /// three colours, three serve R, G, B in order; BadData for any other number.
 std::shared_ptr<const SubsurfaceModel> MakeFactored(
     std::shared_ptr<const factor::Material> material,
-    const FactoredOptions& options = {});
+    const FactoredOptions& options = {},
+    const SampleOnSurface& mapping = {});
 
 }  // namespace nacre::render

@@ -18,7 +18,14 @@ struct SurfacePoint {
   Vec3 tangent_v;  ///< unit, orthogonal to the normal, on the side of ∂p/∂v (may be
                    ///< mirrored)
   Vec2 uv;         ///< (0, 0) lower left of the sample, (1, 1) upper right; repeats
+  /// Of uv on the surface: ∂p/∂u = x tangent_u, ∂p/∂v = y tangent_u + z tangent_v. 0 if
+  /// not known.
+  Vec3 stretch_mm{};
 };
+
+/// The tangents of a point with a normal, from sums along u and v of any length.
+/// Without usable ones, some frame.
+void SetTangents(SurfacePoint& point, Vec3 along_u, Vec3 along_v);
 
 /// A patch of the surface that was lit: light entered here.
 struct LitPoint {

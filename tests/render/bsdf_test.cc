@@ -83,6 +83,8 @@ TEST(BsdfTest, SampledWeightsIntegrateWhatEvaluateGives) {
   const Microfacet facets{Microfacet::Kind::kGgx, 0.4F};
   const std::vector<BsdfPtr> bsdfs = {
       MakeDiffuse(Grey(0.3F)),
+      MakeLocalTranslucency(
+          MakeRoughPlastic(PlasticOf(0.5F, false), facets), Grey(0.6F), 1.3F),
       MakeRoughPlastic(PlasticOf(0.5F, false), facets),
       MakeRoughPlastic(PlasticOf(0.5F, true), {Microfacet::Kind::kBeckmann, 0.4F}),
       MakeRoughConductor({{0.2F, 0.9F, 1.1F}, {3.9F, 2.4F, 2.1F}, Grey(1), false},
@@ -193,6 +195,8 @@ TEST(BsdfTest, ReflectionIsReciprocal) {
   const Microfacet facets{Microfacet::Kind::kGgx, 0.3F};
   const std::vector<BsdfPtr> bsdfs = {
       MakeDiffuse(Grey(0.4F)),
+      MakeLocalTranslucency(
+          MakeRoughPlastic(PlasticOf(0.5F, false), facets), Grey(0.6F), 1.3F),
       MakePlastic(PlasticOf(0.5F, true)),
       MakeRoughPlastic(PlasticOf(0.5F, true), facets),
       MakeRoughConductor({{0.2F, 0.9F, 1.1F}, {3.9F, 2.4F, 2.1F}, Grey(1), false},

@@ -1,4 +1,5 @@
 // Participating media: laws with a closed form, and published slabs.
+#include "render/named_media.h"
 #include "render/volume_file.h"
 #include "tests/render/scene_text.h"
 #include "tests/support/temp_folder.h"
@@ -163,6 +164,63 @@ TEST(VolumeFileTest, RefusesWhatIsCutShortOrNoNumber) {
   EXPECT_THAT(error(path), HasSubstr("12 values announced, 42 bytes follow"));
   std::filesystem::resize_file(path, 20);
   EXPECT_THAT(error(path), HasSubstr("not a volume"));
+}
+
+// Total reflectances of the dipole with Jensen's F_dr polynomial agree with the table
+// that the paper prints beside the coefficients; ketchup and chicken's blue don't in
+// the paper itself.
+TEST(NamedMediaTest, ReproduceTheReflectancesOfThePaper) {
+  const std::map<std::string, Color> printed = {{"apple", {0.85F, 0.84F, 0.53F}},
+                                                {"chicken1", {0.31F, 0.15F, -1}},
+                                                {"chicken2", {0.32F, 0.16F, 0.10F}},
+                                                {"cream", {0.98F, 0.90F, 0.73F}},
+                                                {"marble", {0.83F, 0.79F, 0.75F}},
+                                                {"potato", {0.77F, 0.62F, 0.21F}},
+                                                {"skimmilk", {0.81F, 0.81F, 0.69F}},
+                                                {"skin1", {0.44F, 0.22F, 0.13F}},
+                                                {"skin2", {0.63F, 0.44F, 0.34F}},
+                                                {"spectralon", {1, 1, 1}},
+                                                {"wholemilk", {0.91F, 0.88F, 0.76F}}};
+  for (const auto& [name, reflectance] : printed) {
+    const auto medium = FindNamedMedium(name);
+    ASSERT_TRUE(medium.has_value()) << name;
+    const double eta = static_cast<double>(medium->eta);
+    const double fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
+    const double a = (1 + fdr) / (1 - fdr);
+    for (int c = 0; c < 3; ++c) {
+      const double ss = static_cast<double>(medium->SigmaSPrime()[c]);
+      const double sa = static_cast<double>(medium->sigma_a_per_mm[c]);
+      const double albedo = ss / (ss + sa);
+      const double root = std::sqrt(3 * (1 - albedo));
+      const double total =
+          albedo / 2 * (1 + std::exp(-4 * a / 3 * root)) * std::exp(-root);
+      if (reflectance[c] >= 0) {
+        EXPECT_NEAR(total, static_cast<double>(reflectance[c]), 0.0085)
+            << name << ' ' << c;
+      }
+    }
+  }
+}
+
+// The reduced coefficients that pbrt prints for media of Narasimhan et al. 2006 are
+// those of the scattering and the asymmetry here.
+TEST(NamedMediaTest, ReducedScatteringIsThatOfAnotherProgram) {
+  EXPECT_EQ(NamedMediaNames().size(), 12u + 35);
+  const std::map<std::string, Color> reduced = {
+      {"Lowfat Milk", {0.89187F, 1.5136F, 2.532F}},
+      {"regularmilk", {4.5513F, 5.8294F, 7.136F}},
+      {"Espresso", {0.72378F, 0.84557F, 1.0247F}},
+      {"White Grapefruit Juice", {0.22826F, 0.23998F, 0.32748F}},
+      {"cappuccino powder", {1.8436F, 2.5851F, 2.1662F}},
+      {"suisse_mocha_powder", {2.7979F, 3.5452F, 4.3365F}}};
+  for (const auto& [name, expected] : reduced) {
+    const auto medium = FindNamedMedium(name);
+    ASSERT_TRUE(medium.has_value()) << name;
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(medium->SigmaSPrime()[c] / expected[c], 1, 2e-4F) << name << c;
+    }
+  }
+  EXPECT_FALSE(FindNamedMedium("mlik").has_value());
 }
 
 }  // namespace

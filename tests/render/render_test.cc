@@ -218,7 +218,7 @@ TEST(RenderTest, UnknownIntegratorsAreUsageErrors) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kUsage);
     EXPECT_THAT(e.what(),
-                HasSubstr("there are scene, path, direct, fast and reference"));
+                HasSubstr("there are scene, path, direct, fast, sppm and reference"));
   }
 }
 

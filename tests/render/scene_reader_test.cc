@@ -1,7 +1,6 @@
 #include "core/exr.h"
 #include "core/png.h"
 #include "factor/material.h"
-#include "render/jensen_media.h"
 #include "render/preset_path.h"
 #include "tests/render/scene_text.h"
 #include "tests/support/temp_folder.h"
@@ -210,8 +209,8 @@ TEST(SceneReaderTest, UnknownWordsAreErrorsWithTheLineAndTheNearestWord) {
        "no substance 'watr'; did you mean 'water'?"},
       {"<shape type=\"cube\"><subsurface type=\"dipole\"><string name=\"material\" "
        "value=\"marbel\"/></subsurface></shape>",
-       "no medium 'marbel' in the table of Jensen et al. 2001; did you mean "
-       "'marble'?"}};
+       "no medium 'marbel' in the tables of Jensen et al. 2001 and Narasimhan et al. "
+       "2006; did you mean 'marble'?"}};
   for (const auto& [body, message] : cases) {
     EXPECT_THAT(BodyError(body), HasSubstr(message)) << body;
   }
@@ -422,43 +421,6 @@ TEST(PresetTest, IsLookedForWhereTheManualSays) {
     EXPECT_THAT(e.what(), HasSubstr("set NACRE_PRESET_PATH"));
   }
   unsetenv("NACRE_PRESET_PATH");
-}
-
-// Total reflectances of the dipole with Jensen's F_dr polynomial agree with the table
-// that the paper prints beside the coefficients; ketchup and chicken's blue don't in
-// the paper itself.
-TEST(JensenMediaTest, ReproduceTheReflectancesOfThePaper) {
-  const std::map<std::string, Color> printed = {{"apple", {0.85F, 0.84F, 0.53F}},
-                                                {"chicken1", {0.31F, 0.15F, -1}},
-                                                {"chicken2", {0.32F, 0.16F, 0.10F}},
-                                                {"cream", {0.98F, 0.90F, 0.73F}},
-                                                {"marble", {0.83F, 0.79F, 0.75F}},
-                                                {"potato", {0.77F, 0.62F, 0.21F}},
-                                                {"skimmilk", {0.81F, 0.81F, 0.69F}},
-                                                {"skin1", {0.44F, 0.22F, 0.13F}},
-                                                {"skin2", {0.63F, 0.44F, 0.34F}},
-                                                {"spectralon", {1, 1, 1}},
-                                                {"wholemilk", {0.91F, 0.88F, 0.76F}}};
-  EXPECT_EQ(JensenMediumNames().size(), printed.size() + 1);
-  for (const auto& [name, reflectance] : printed) {
-    const auto medium = FindJensenMedium(name);
-    ASSERT_TRUE(medium.has_value()) << name;
-    const double eta = static_cast<double>(medium->eta);
-    const double fdr = -1.440 / (eta * eta) + 0.710 / eta + 0.668 + 0.0636 * eta;
-    const double a = (1 + fdr) / (1 - fdr);
-    for (int c = 0; c < 3; ++c) {
-      const double ss = static_cast<double>(medium->sigma_s_prime_per_mm[c]);
-      const double sa = static_cast<double>(medium->sigma_a_per_mm[c]);
-      const double albedo = ss / (ss + sa);
-      const double root = std::sqrt(3 * (1 - albedo));
-      const double total =
-          albedo / 2 * (1 + std::exp(-4 * a / 3 * root)) * std::exp(-root);
-      if (reflectance[c] >= 0) {
-        EXPECT_NEAR(total, static_cast<double>(reflectance[c]), 0.0085)
-            << name << ' ' << c;
-      }
-    }
-  }
 }
 
 }  // namespace

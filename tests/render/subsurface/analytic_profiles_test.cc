@@ -145,7 +145,7 @@ TEST(AnalyticProfiles, AreReadFromScenes) {
               HasSubstr("-1 mm thick"));
   EXPECT_THAT(ReaderError(WithSubsurface("normalizeddiffusion",
                                          R"(<rgb name="reflectance" value="2"/>)")),
-              HasSubstr("albedo 2"));
+              HasSubstr("reaches 2"));
 }
 
 }  // namespace
