@@ -32,9 +32,7 @@ class Monitor {
   /// picture's exposure, share of saturated pixels and histogram, faults so far.
   std::string StateJson() const;
 
-  /// The last frame as an 8-bit RGB PNG of at most `max_side_px`: the square root of
-  /// the counts as grey, pixels at the converter's last count red. Empty before there
-  /// is one.
+  /// The last frame's picture (frame_png.h), empty before there is one.
   std::string FramePng(int max_side_px) const;
 
  private:
