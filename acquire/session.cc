@@ -227,6 +227,13 @@ Frame SessionReader::ReadFrame(std::int64_t number) const {
         "{}: picture {} was left out: {}", folder_.string(), number, entry.skipped));
   }
   const std::filesystem::path path = folder_ / entry.file;
+  if (!std::filesystem::exists(path)) {
+    throw BadData(
+        fmt::format("{}: picture {} is in the journal, but the file is "
+                    "missing; was the session copied whole?",
+                    path.string(),
+                    number));
+  }
   const std::string bytes = ReadFile(path);
   if (HashHex(bytes.data(), bytes.size()) != entry.hash) {
     throw BadData(path.string() +

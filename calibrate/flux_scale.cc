@@ -135,18 +135,31 @@ struct Discs {
   double pixel_mm = 0;
 };
 
-// A spot between the pixels of one colour is seen brighter or darker than it is: the
-// sum over pixels 2 apart varies by 2 m cos(π x) along each axis, m what spot and pixel
-// leave of half a cycle a pixel. Green ones lie closer, on a diagonal.
-double SamplingVariance(std::size_t planes, const SpotProfile& spot, double pixel_mm) {
-  if (planes == 0) {
-    return 0;
-  }
+// A spot between the pixels of one colour is seen brighter or darker than it is: a sum
+// over every second pixel varies by 2 m cos(π x) along each axis, m what spot and pixel
+// leave of half a cycle a pixel. Planes whose pixels lie a pixel apart undo each
+// other's share of it.
+double SamplingVariance(const std::vector<PlaneShare>& planes,
+                        const SpotProfile& spot,
+                        double pixel_mm) {
   const double sigma2_px2 = 0.5 * (spot.xx_mm2 + spot.yy_mm2) / (pixel_mm * pixel_mm);
-  const double cycles2 = planes == 1 ? 0.25 : 0.5;
   const double pi = std::numbers::pi;
-  const double m = 2 / pi * std::exp(-2 * pi * pi * cycles2 * sigma2_px2);
-  return 4 * m * m;
+  const double m = 2 / pi * std::exp(-0.5 * pi * pi * sigma2_px2);
+  double along_x = 0;
+  double along_y = 0;
+  double both = 0;
+  for (const PlaneShare& share : planes) {
+    if (share.plane.step == 1) {
+      return 0;
+    }
+    const double x = share.plane.column == 0 ? 1 : -1;
+    const double y = share.plane.row == 0 ? 1 : -1;
+    along_x += share.weight * x;
+    along_y += share.weight * y;
+    both += share.weight * x * y;
+  }
+  return 2 * m * m * (along_x * along_x + along_y * along_y) +
+         4 * m * m * m * m * both * both;
 }
 
 Discs DiscsOf(const acquire::SessionReader& session,
@@ -259,8 +272,8 @@ FluxResult EstimateFluxScales(const acquire::SessionReader& session,
          .flux_scale_spread = read.powers.spread,
          .flux_scale_sigma = FluxSigma(pictures, transfer, read, discs, mean)});
     result.spots.push_back(sums.Profile(ground, read.one_way));
-    read.powers.sampling = SamplingVariance(
-        pictures.PlaneCount(channel), result.spots.back(), discs.pixel_mm);
+    read.powers.sampling =
+        SamplingVariance(pictures.Planes(channel), result.spots.back(), discs.pixel_mm);
     light_noise.Add(read.powers, ways);
   }
   result.light_noise = light_noise.Result();

@@ -39,9 +39,9 @@ class RatePictures {
   std::vector<double> Variances(const std::vector<float>& rates,
                                 const Lighting& lighting,
                                 double gain_electrons_per_count) const;
-  /// Of a mosaic's planes those that see that laser; 0 of a monochrome sensor.
-  std::size_t PlaneCount(int channel) const {
-    return filters_.mosaic.empty() ? 0 : SharesOf(filters_, channel).size();
+  /// The planes that see that laser.
+  std::vector<PlaneShare> Planes(int channel) const {
+    return SharesOf(filters_, channel);
   }
   std::vector<float> Shares(int channel, int width, int height) const {
     return PixelShares(filters_, channel, width, height);

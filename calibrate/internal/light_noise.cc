@@ -63,7 +63,13 @@ void LightNoiseSums::Add(const SpotPowers& powers, std::size_t ways) {
   }
   const double lasting = powers.spread * powers.spread - powers.sampling -
                          (powers.noise + std::max(0.0, ripple2)) / frames;
-  speckle2_ += lasting * powers.pixels_a_spot * static_cast<double>(ways);
+  // What a mosaic's gaps add goes with the exponential of the spot's width squared,
+  // which its skirts make too large: a channel with so little beyond it can't tell.
+  constexpr double kUnsure = 3;
+  if (powers.sampling == 0 || lasting > kUnsure * powers.sampling) {
+    speckle2_ += lasting * powers.pixels_a_spot * static_cast<double>(ways);
+    speckle_channels_ += 1;
+  }
   channels_ += 1;
 }
 
@@ -76,7 +82,8 @@ LightNoise LightNoiseSums::Result() const {
     noise.ripple = std::sqrt(ripple2);
     noise.ripple_sigma = 0.5 * sigma2 / noise.ripple;
   }
-  noise.speckle_contrast = std::sqrt(std::max(0.0, speckle2_ / channels_));
+  noise.speckle_contrast =
+      std::sqrt(std::max(0.0, speckle2_ / std::max(1.0, speckle_channels_)));
   return noise;
 }
 

@@ -27,6 +27,7 @@ class LightNoiseSums {
   double ripple2_ = 0;
   double ripple2_variance_ = 0;
   double speckle2_ = 0;
+  double speckle_channels_ = 0;
   double channels_ = 0;
 };
 

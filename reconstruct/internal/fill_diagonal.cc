@@ -1,5 +1,6 @@
 #include "reconstruct/internal/fill_diagonal.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace nacre::reconstruct::internal {
@@ -7,7 +8,7 @@ namespace {
 
 // A straight line through (r, ln R_d).
 struct Line {
-  double count = 0, r = 0, y = 0, rr = 0, ry = 0;
+  double count = 0, r = 0, y = 0, rr = 0, ry = 0, yy = 0;
 
   void Add(double at, double value) {
     count += 1;
@@ -15,11 +16,21 @@ struct Line {
     y += value;
     rr += at * at;
     ry += at * value;
+    yy += value * value;
   }
-  double At(double at) const {
-    const double determinant = count * rr - r * r;
-    const double slope = determinant > 0 ? (count * ry - r * y) / determinant : 0;
-    return (y - slope * r) / count + slope * at;
+  double Determinant() const { return count * rr - r * r; }
+  double Slope() const {
+    return Determinant() > 0 ? (count * ry - r * y) / Determinant() : 0;
+  }
+  double At(double at) const { return (y - Slope() * r) / count + Slope() * at; }
+  // Of a further value there: the scatter around the line, and what that leaves open of
+  // the line itself.
+  double Variance(double at) const {
+    const double residual = yy - y * y / count - Slope() * (count * ry - r * y) / count;
+    const double from_middle = at - r / count;
+    const double reach =
+        Determinant() > 0 ? count * from_middle * from_middle / Determinant() : 0;
+    return std::max(0.0, residual) / std::max(1.0, count - 2) * (1 + 1 / count + reach);
   }
 };
 
@@ -48,11 +59,16 @@ void FillDiagonal(const RdHeader& header, double radius_cells, RdSlice& slice) {
     });
     for_each(c, [&](std::size_t at, double r) {
       if (r <= radius_cells) {
+        const bool is_filled = positive && line.count > 2;
+        // Inside, ln R_d may rise as steeply as outside or not at all.
+        const double rise =
+            -std::expm1(line.Slope() * (radius_cells + 0.5 * kRing - r));
         slice.valid[at] = 0;
-        slice.sigma[at] = 0;
-        slice.rd[at] = positive && line.count > 2
-                           ? static_cast<float>(std::exp(line.At(r)))
-                           : 0.0F;
+        slice.rd[at] = is_filled ? static_cast<float>(std::exp(line.At(r))) : 0.0F;
+        slice.sigma[at] = is_filled
+                              ? slice.rd[at] * static_cast<float>(std::hypot(
+                                                   std::sqrt(line.Variance(r)), rise))
+                              : 0.0F;
       }
     });
   }

@@ -1,8 +1,10 @@
 #include "acquire/session.h"
 
 #include "acquire/frame_file.h"
+#include "acquire/read_ahead.h"
 #include "acquire/session_writer.h"
 #include "core/atomic_file.h"
+#include "core/error.h"
 #include "core/json.h"
 #include "tests/acquire/fake_rig.h"
 #include "tests/support/temp_folder.h"
@@ -121,6 +123,25 @@ TEST(Session, AFlippedBitInAFrameIsNoticed) {
   EXPECT_NO_THROW(session.ReadFrame(1));
   EXPECT_THAT(ErrorOf([&] { session.ReadFrame(2); }),
               HasSubstr("000002.pgm: doesn't match its checksum"));
+}
+
+TEST(Session, AMissingPictureIsBadDataThatIsNamed) {
+  const TempFolder folder;
+  CaptureTargets(folder);
+  std::filesystem::remove(folder / "s" / "frames" / "000002.pgm");
+  const SessionReader session(folder / "s");
+  try {
+    session.ReadFrame(2);
+    FAIL() << "a picture that isn't there was read";
+  } catch (const nacre::Error& error) {
+    EXPECT_EQ(error.code(), nacre::ExitCode::kBadData);
+  }
+  EXPECT_THAT(ErrorOf([&] { session.ReadFrame(2); }),
+              HasSubstr("000002.pgm: picture 2 is in the journal"));
+  // Read ahead, it is passed over.
+  ReadAhead ahead(session, {0, 2, session.picture_count(), 1});
+  ahead.Allow(100);
+  EXPECT_NO_THROW(session.ReadFrame(1));
 }
 
 TEST(Session, AColourCamerasFramesAreKeptRawAndReadGreyIfOneLikes) {

@@ -3,9 +3,11 @@
 #include "calibrate/mosaic.h"
 
 #include "acquire/mosaic.h"
+#include "calibrate/internal/light_noise.h"
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 namespace nacre::calibrate {
@@ -113,6 +115,24 @@ TEST(Mosaic, AMonochromeSensorIsOnePlane) {
   std::vector<float> picture = {1, 2, 3, 4};
   FillIn({}, 0, 2, picture);
   EXPECT_EQ(picture, (std::vector<float>{1, 2, 3, 4}));
+}
+
+// A channel whose spots a mosaic's gaps make differ can't tell speckle.
+TEST(LightNoise, AMosaicsGapsAreNoSpeckle) {
+  const internal::SpotPowers blind{.pictures = {{1, 1}, {1, 1}},
+                                   .noise = 0,
+                                   .spread = std::sqrt(5e-4),
+                                   .sampling = 1.6e-4,
+                                   .pixels_a_spot = 3};
+  internal::SpotPowers keen = blind;
+  keen.sampling = 0;
+  keen.spread = 0.05 / std::sqrt(8.0);
+  keen.pixels_a_spot = 8;
+  internal::LightNoiseSums alone;
+  alone.Add(blind, 1);
+  EXPECT_EQ(alone.Result().speckle_contrast, 0);
+  alone.Add(keen, 1);
+  EXPECT_NEAR(alone.Result().speckle_contrast, 0.05, 1e-12);
 }
 
 }  // namespace

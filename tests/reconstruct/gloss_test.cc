@@ -1,6 +1,7 @@
 #include "reconstruct/internal/gloss.h"
 
 #include "core/random.h"
+#include "reconstruct/internal/fill_diagonal.h"
 #include "reconstruct/internal/gloss_fit.h"
 #include "reconstruct/internal/nonnegative_fit.h"
 #include "reconstruct/internal/polygon.h"
@@ -202,6 +203,38 @@ TEST(Pool, OfEstimatesThatDisagreeIsAsUncertainAsTheyAreApart) {
   const Pooled pooled = Pool({{0.0, 0.1}, {2.0, 0.1}});
   EXPECT_NEAR(pooled.tau2, 0.5 * 4 - 0.01, 1e-9);
   EXPECT_NEAR(pooled.mean.sigma, 1, 1e-9);
+}
+
+// Of light that falls off like a dipole's, not like the line that is drawn through it.
+TEST(FillDiagonal, SigmaIsAsLargeAsTheGuessIsOff) {
+  RdHeader header;
+  header.points_x = header.points_y = 1;
+  header.core = 11;
+  header.pitch_mm = 0.5;
+  header.channels = {"R"};
+  const auto truth = [&](int u, int v) {
+    const double r = 0.5 * std::hypot(u, v);
+    const double d = std::hypot(r, 1.0);
+    return std::exp(-d) * (1 + d) / (d * d * d);
+  };
+  for (const double radius : {0.0, 1.0, 1.5}) {
+    RdSlice slice = MakeSlice(header);
+    for (int k = 0; k < 121; ++k) {
+      slice.rd[static_cast<std::size_t>(k)] =
+          static_cast<float>(truth(k % 11 - 5, k / 11 - 5));
+    }
+    FillDiagonal(header, radius, slice);
+    for (int k = 0; k < 121; ++k) {
+      const auto at = static_cast<std::size_t>(k);
+      if (slice.valid[at] == 0) {
+        const double off =
+            static_cast<double>(slice.rd[at]) - truth(k % 11 - 5, k / 11 - 5);
+        EXPECT_GT(slice.sigma[at], 0);
+        EXPECT_LT(std::abs(off), 1.5 * static_cast<double>(slice.sigma[at]));
+        EXPECT_LT(slice.sigma[at], slice.rd[at]);
+      }
+    }
+  }
 }
 
 TEST(Gloss, IsToldOfWhereItStandsOutOfItsUncertainty) {
