@@ -7,6 +7,7 @@
 #include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
+#include "reconstruct/internal/exposure_advice.h"
 #include "reconstruct/internal/fill_diagonal.h"
 #include "reconstruct/internal/glare_floor.h"
 #include "reconstruct/internal/gloss.h"
@@ -210,6 +211,7 @@ void Measure(const GroupReader& reader,
 struct Finishing {
   const calibrate::Calibration& calibration;
   const internal::GlossRemover& gloss;
+  const internal::ExposureAdvice& advice;
   double longest_us;
 };
 
@@ -223,6 +225,7 @@ void WriteSlices(const Finishing& finishing,
                  const ProgressFunction& progress) {
   const auto width = static_cast<std::size_t>(header.points_x);
   internal::SymmetrizeChange change;
+  internal::ExposureAdvice::Counts dim;
   for (int j = 0; j < header.points_y; ++j) {
     Report(progress, {"reconstruct", j, header.points_y, "slices"});
     constexpr std::size_t kSlicesAtOnce = 64;
@@ -232,6 +235,7 @@ void WriteSlices(const Finishing& finishing,
       std::vector<double> shares(count, 0.0);
       std::vector<internal::SymmetrizeChange> changes(count);
       std::vector<std::int64_t> below(count, 0);
+      std::vector<internal::ExposureAdvice::Counts> dims(count);
       ParallelFor(std::ssize(slices), options.thread_count, [&](std::int64_t n) {
         const auto k = static_cast<std::size_t>(n);
         const std::int64_t s =
@@ -249,6 +253,7 @@ void WriteSlices(const Finishing& finishing,
               header, finishing.calibration, finishing.longest_us, slices[k]);
         }
         below[k] = internal::MarkBelowFloor(header, separation.Floor(s), slices[k]);
+        dims[k] = finishing.advice.Look(slices[k]);
       });
       for (std::size_t k = 0; k < count; ++k) {
         writer.WriteSlice(static_cast<int>(first + k), j, slices[k]);
@@ -257,8 +262,12 @@ void WriteSlices(const Finishing& finishing,
             std::count(slices[k].valid.begin(), slices[k].valid.end(), 0);
         summary.below_floor_count += below[k];
         change.Add(changes[k]);
+        dim.Add(dims[k]);
       }
     }
+  }
+  if (std::string text = finishing.advice.Warning(dim); !text.empty()) {
+    summary.warnings.push_back(std::move(text));
   }
   summary.symmetrize_change = change.Share();
   summary.symmetrize_worst_total = change.worst_total;
@@ -327,9 +336,11 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   spool.Forget();
   const internal::GlossRemover remover(gloss, calibration, state.plane, header, reader);
   const auto& exposures_us = session.rig().camera.exposures_us;
+  const internal::ExposureAdvice advice(calibration, header, exposures_us);
   const Finishing finishing{
       calibration,
       remover,
+      advice,
       *std::max_element(exposures_us.begin(), exposures_us.end())};
   WriteSlices(finishing, options, header, separation, writer, summary, progress);
   if (summary.below_floor_count > 0) {

@@ -2,6 +2,8 @@
 
 #include "reconstruct/internal/glare_floor.h"
 
+#include "reconstruct/internal/exposure_advice.h"
+
 #include <gtest/gtest.h>
 
 #include <vector>
@@ -54,6 +56,41 @@ TEST(GlareFloor, WithoutGlareNothingIsMarked) {
   EXPECT_EQ(MarkBelowFloor(header, std::vector<float>(slice.rd.size(), 0.0F), slice),
             0);
   EXPECT_EQ(slice.valid[3], 1);
+}
+
+// At 10 ms 4 counts are as noisy as the sensor; half of the values need a fourfold
+// exposure, a quarter more than that.
+TEST(ExposureAdvice, NamesAnExposureThatIsLongEnough) {
+  calibrate::Calibration calibration;
+  calibration.gain_electrons_per_count = 4;
+  calibration.read_noise_electrons = 4;
+  calibration.channels = {{.name = "R", .flux_scale_counts_mm2_sr_per_us = 1}};
+  calibration.camera.camera_from_sample_translation_mm = {0, 0, -500};
+  calibration.scan_map.half_width_mm = 1;
+  calibration.scan_map.half_width_rad = 0.01;
+  RdHeader header;
+  header.points_x = header.points_y = 1;
+  header.core = 5;
+  header.pitch_mm = 1;
+  header.channels = {"R"};
+  const ExposureAdvice advice(calibration, header, {10000, 1000});
+  const double sensor = calibration.VarianceCounts2(0);
+  const double alike = sensor / (calibration.VarianceCounts2(1) - sensor) / 10000 *
+                       calibration.RdPerRate(0, {0, 0}, {0, 0}, header.eta);
+  RdSlice slice = MakeSlice(header);
+  for (std::size_t k = 0; k < 25; ++k) {
+    slice.rd[k] = static_cast<float>(alike * (k < 5 ? 1.1 : k < 18 ? 0.3 : 0.01));
+  }
+  slice.valid[24] = 0;
+  const ExposureAdvice::Counts counts = advice.Look(slice);
+  EXPECT_EQ(counts.valid, 24);
+  EXPECT_EQ(counts.dim[1], 13);
+  EXPECT_EQ(counts.dim[6], 6);
+  const std::string text = advice.Warning(counts);
+  EXPECT_NE(text.find("79 % of the values"), std::string::npos) << text;
+  EXPECT_NE(text.find("40 ms beside"), std::string::npos) << text;
+  EXPECT_NE(text.find("leave 25 %, for 50 % more"), std::string::npos) << text;
+  EXPECT_EQ(advice.Warning({.valid = 100, .dim = {20}}), "");
 }
 
 }  // namespace
