@@ -45,10 +45,11 @@ SpotSums::SpotSums(const PixelGround& ground,
   for (std::size_t k = 0; k < ground.centre.size(); ++k) {
     const auto share = static_cast<double>(shares[k]);
     for (std::size_t s = 0; share > 0 && s < spots.size(); ++s) {
-      const double r =
-          std::hypot(ground.centre[k].x - spots[s].x, ground.centre[k].y - spots[s].y);
-      if (r <= reach_mm) {
-        members_.push_back({k, s, share * ground.area_mm2[k], r <= core_mm});
+      const double dx = ground.centre[k].x - spots[s].x;
+      const double dy = ground.centre[k].y - spots[s].y;
+      const double r2 = dx * dx + dy * dy;
+      if (r2 <= reach_mm * reach_mm) {
+        members_.push_back({k, s, share * ground.area_mm2[k], r2 <= core_mm * core_mm});
       }
     }
   }
