@@ -7,6 +7,7 @@
 #include "core/options_json.h"
 #include "core/png.h"
 #include "core/provenance.h"
+#include "render/denoise.h"
 #include "render/tev.h"
 #include "render/tone.h"
 
@@ -25,6 +26,7 @@ struct Arguments {
   bool lenient = false;
   bool stats = false;
   bool reference = false;
+  bool denoise = false;
   std::filesystem::path checkpoint;
   std::string tev;
   double exposure_ev = 0;
@@ -52,6 +54,10 @@ void AddArguments(CLI::App& app, Arguments& arguments) {
                  arguments.checkpoint,
                  "keep all samples in this file every ten seconds; if it is there "
                  "already, go on from it");
+  app.add_flag("--denoise",
+               arguments.denoise,
+               "take the noise out by Open Image Denoise, if it is installed; with "
+               "--aovs the noisy picture and what the denoiser looked at are kept");
   app.add_option("--tev",
                  arguments.tev,
                  "HOST:PORT of a tev that shows the picture as it is made, every "
@@ -81,6 +87,9 @@ std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments)
   }
   provenance.options["seed"] = arguments.options.seed;
   provenance.options["define"] = arguments.defines;
+  if (arguments.denoise) {
+    provenance.options["denoise"] = true;
+  }
   for (const std::filesystem::path& file : scene.files) {
     provenance.AddInput(file);
   }
@@ -117,6 +126,22 @@ void WriteImage(const std::filesystem::path& path,
   WriteExr(path, parts);
 }
 
+// The picture in `parts` without its noise; with AOVs, also what that was made from.
+void DenoiseFirst(std::vector<ExrPart>& parts,
+                  const render::Scene& scene,
+                  const render::RenderOptions& options) {
+  const render::FeatureImages features =
+      render::FirstHitFeatures(scene, options.seed, options.thread_count);
+  ExrPart noisy = parts.front();
+  parts.front() = render::Denoise(noisy, features);
+  if (options.aovs) {
+    noisy.name = "noisy";
+    parts.push_back(std::move(noisy));
+    parts.push_back(features.albedo);
+    parts.push_back(features.normal);
+  }
+}
+
 int Run(Arguments& arguments, const Common& common) {
   if (!IsPng(arguments.out) && arguments.out.extension() != ".exr") {
     throw UsageError("--out " + arguments.out.string() +
@@ -128,6 +153,9 @@ int Run(Arguments& arguments, const Common& common) {
   }
   options.seed = common.seed;
   options.thread_count = common.thread_count;
+  if (arguments.denoise) {
+    render::RequireDenoiser();
+  }
   const render::Scene scene = render::ReadScene(
       arguments.scene,
       {.defines = ParseDefines(arguments.defines), .lenient = arguments.lenient});
@@ -167,8 +195,11 @@ int Run(Arguments& arguments, const Common& common) {
                      {arguments.checkpoint, IdentityOf(provenance)});
   std::vector<ExrPart> parts = rendering.aovs;
   parts.insert(parts.begin(), rendering.image);
+  if (arguments.denoise) {
+    DenoiseFirst(parts, scene, options);
+  }
   save(parts);
-  show(rendering.image);
+  show(parts.front());
   Json json = rendering.summary.ToJson();
   json["out"] = arguments.out.string();
   Print(common,

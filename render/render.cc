@@ -13,6 +13,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <mutex>
+#include <optional>
 
 namespace nacre::render {
 namespace {
@@ -257,7 +258,10 @@ Rendering Render(const Scene& scene,
   const Exitances exitances(world, settings, options, progress, summary);
 
   PathTracer tracer(world, exitances.sources(), settings);
-  const CausticPhotons caustics(world, settings.photons, settings.max_depth);
+  std::optional<CausticPhotons> caustics;
+  if (settings.photons.enabled) {
+    caustics.emplace(world, settings.photons, settings.max_depth);
+  }
   PhotonMap photons;
   const SamplePlan plan(scene.film,
                         {.spp = SamplesAtMost(scene, options),
@@ -269,7 +273,7 @@ Rendering Render(const Scene& scene,
   std::int64_t made = made_before;
   std::mutex report_mutex;
   for (std::vector<int> next = plan.Next(film); !next.empty(); next = plan.Next(film)) {
-    if (settings.photons.enabled) {
+    if (caustics) {
       // A map for each sample of the pixels.
       std::fill(next.begin(), next.end(), static_cast<int>(film.SamplesMade(0)) + 1);
     }
@@ -277,8 +281,8 @@ Rendering Render(const Scene& scene,
       summary.time_ran_out = true;
       break;
     }
-    if (settings.photons.enabled) {
-      photons = caustics.Map(film.SamplesMade(0), options.seed, options.thread_count);
+    if (caustics) {
+      photons = caustics->Map(film.SamplesMade(0), options.seed, options.thread_count);
       tracer.UsePhotons(&photons);
     }
     pass.Run(

@@ -206,7 +206,7 @@ bool PathTracer::Continue(State& state,
     return false;
   }
   state.delta = sample.delta;
-  state.carried = CarriesPhotons(*hit.shape);
+  state.carried = photons_ != nullptr && CarriesPhotons(*hit.shape);
   state.from_shown = state.carried ? state.from_shown : !sample.delta;
   if (!sample.delta && sample.pdf <= kSharpPdf) {
     state.sight = Sight::kBlurred;
