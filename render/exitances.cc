@@ -126,7 +126,7 @@ void Exitances::Illuminate(std::uint32_t shape,
   owned_[shape] = std::make_unique<ExitanceField>(
       lit_shape,
       model.Illuminate(std::move(points.points), options.thread_count),
-      static_cast<float>(options.exitance_spacing) * model.PatchSizeMm());
+      static_cast<float>(options.exitance_spacing) * model.ExitanceSpacingMm());
   summary.models_s += model_time.Seconds();
 }
 

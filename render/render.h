@@ -26,7 +26,7 @@ struct RenderOptions {
   double clamp = 0;
   double points_per_patch = 16;
   double max_lit_points = 2e6;
-  double exitance_spacing = 2;
+  double exitance_spacing = 1;
   bool lazy = true;
   double snapshot_s = 0;
 
@@ -74,8 +74,8 @@ struct RenderOptions {
     visit("exitance_spacing",
           self.exitance_spacing,
           Range{0, 64},
-          "distance in patches of the points where a translucent surface's exitance is "
-          "evaluated, with interpolation between; 0: at every hit");
+          "distance of the points where a translucent surface's exitance is evaluated, "
+          "with interpolation between, in what its model asks for; 0: at every hit");
     visit("lazy",
           self.lazy,
           Range{},

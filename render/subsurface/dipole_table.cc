@@ -59,6 +59,7 @@ double OctaveAxis<kBits>::Distance(std::uint32_t index) const {
 
 template class OctaveAxis<5>;
 template class OctaveAxis<1>;
+template class OctaveAxis<2>;
 
 DipoleTable::DipoleTable(const ProfileTriple& profiles,
                          double largest_disc_mm,

@@ -46,7 +46,7 @@ class FactoredGather final : public Subsurface {
         along_surface_(mapping.mapping() == Mapping::kTexture),
         tree_(std::move(patches)),
         per_mm_(1 / windows_->pitch_mm()),
-        reach_mm_(std::numbers::sqrt2_v<float> * windows_->radius() *
+        reach_mm_(std::numbers::sqrt2_v<float> * (windows_->radius() + 0.5F) *
                   windows_->pitch_mm()),
         max_relative_extent_(static_cast<float>(options.max_relative_extent)) {
     for (const Patch& patch : tree_.patches()) {
@@ -96,9 +96,10 @@ class FactoredGather final : public Subsurface {
     ColorLanes sum;
     for (std::size_t n = 0; n < lookups.size(); ++n) {
       const Lookup& ahead = lookups[std::min(n + kAhead, lookups.size() - 1)];
-      windows_->Prefetch(ahead.source->window, ahead.column, ahead.row);
+      windows_->Prefetch(
+          ahead.source->window, ahead.squared, ahead.cell.x, ahead.cell.y);
       const Lookup& now = lookups[n];
-      sum += windows_->At(now.source->window, now.column, now.row) *
+      sum += windows_->At(now.source->window, now.squared, now.cell.x, now.cell.y) *
              (now.source->flux_w * now.weight);
     }
     return {sum.v[0], sum.v[1], sum.v[2]};
@@ -113,13 +114,14 @@ class FactoredGather final : public Subsurface {
     Vec3 row_axis;     ///< −v
     Vec2 extent_a;     ///< of a patch: standard deviations, in columns and rows
     Vec2 extent_b;
-    float variance = 0;  ///< of a cluster, along each direction
+    Vec2 beside;         ///< of x_i from its window's grid point
+    float variance = 0;  ///< along each direction
     int window = 0;
   };
   struct Lookup {
     const Source* source;
-    float column;
-    float row;
+    Vec2 cell;      ///< x_o from the grid point of the source's window
+    float squared;  ///< |x_o − x_i|²
     float weight;
   };
   /// From x_i to x_o, in pitches.
@@ -130,7 +132,8 @@ class FactoredGather final : public Subsurface {
 
   Source SourceOf(const Patch& patch, const SamplePlace& place) const {
     Source source;
-    source.flux_w = ToLanes(patch.flux_w * place.weight);
+    const MaterialWindows::Entry entry = windows_->EntryAt(place.uv);
+    source.flux_w = ToLanes(patch.flux_w * place.weight) * entry.scale;
     source.column_axis = place.tangent_u * per_mm_;
     source.row_axis = -(place.tangent_v * per_mm_);
     const auto in_plane = [&](Vec3 v) {
@@ -138,7 +141,12 @@ class FactoredGather final : public Subsurface {
     };
     source.extent_a = in_plane(patch.axis_a_mm);
     source.extent_b = in_plane(patch.axis_b_mm);
-    source.window = windows_->WindowAt(place.uv);
+    source.variance = 0.5F *
+                      (Dot(patch.axis_a_mm, patch.axis_a_mm) +
+                       Dot(patch.axis_b_mm, patch.axis_b_mm)) *
+                      per_mm_ * per_mm_;
+    source.window = entry.window;
+    source.beside = entry.beside;
     return source;
   }
 
@@ -180,21 +188,21 @@ class FactoredGather final : public Subsurface {
 
   /// One lookup, unless it is out of reach.
   void Add(const Source& source,
-           Vec2 plane,
+           Vec2 cell,
            float squared,
            float weight,
            std::vector<Lookup>& lookups) const {
-    const Vec2 at = InWindow(plane, squared);
-    if (std::max(std::abs(at.x), std::abs(at.y)) < windows_->radius()) {
-      lookups.push_back({&source, at.x, at.y, weight});
+    if (std::max(std::abs(cell.x), std::abs(cell.y)) < windows_->radius()) {
+      lookups.push_back({&source, cell, squared, weight});
     }
   }
 
   void AddPatch(const Source& source,
                 const Offset& d,
                 std::vector<Lookup>& lookups) const {
+    const Vec2 cell = InWindow(d.plane, d.squared) + source.beside;
     if (d.squared > kNearPitches * kNearPitches) {
-      Add(source, d.plane, d.squared, 1, lookups);
+      Add(source, cell, AsOfPoint(d, source), 1, lookups);
       return;
     }
     // The mean over the patch by the product of two two-point Gauss rules.
@@ -204,7 +212,7 @@ class FactoredGather final : public Subsurface {
     const Vec2 difference = source.extent_a - source.extent_b;
     for (const Vec2 p :
          {d.plane + sum, d.plane - sum, d.plane + difference, d.plane - difference}) {
-      Add(source, p, p.x * p.x + p.y * p.y + outside, 0.25F, lookups);
+      Add(source, cell, p.x * p.x + p.y * p.y + outside, 0.25F, lookups);
     }
   }
 
@@ -214,15 +222,20 @@ class FactoredGather final : public Subsurface {
     if (d.squared < kNearPitches * kNearPitches) {
       return false;
     }
-    // What is spread out in its plane gives more than its centre. For R_d ~ r^−n,
-    // variance v along each direction, and s² the share of the plane in r², the mean is
-    // that of a point at r (1 − v/(2 r²) ((n + 2) s² − 2)), to second order; n is about
-    // 3 where it matters.
+    const float squared = AsOfPoint(d, source);
+    Add(source, InWindow(d.plane, squared), squared, 1, lookups);
+    return true;
+  }
+
+  /// What is spread out in its plane gives more than its centre. For R_d ~ r^−n,
+  /// variance v along each direction, and s² the share of the plane in r², the mean is
+  /// that of a point at r (1 − v/(2 r²) ((n + 2) s² − 2)), to second order; n is about
+  /// 3 where it matters.
+  static float AsOfPoint(const Offset& d, const Source& source) {
     const float in_plane = d.plane.x * d.plane.x + d.plane.y * d.plane.y;
     const float nearer =
         1 - 0.5F * source.variance / d.squared * (5 * in_plane / d.squared - 2);
-    Add(source, d.plane, d.squared * nearer * nearer, 1, lookups);
-    return true;
+    return d.squared * nearer * nearer;
   }
 
   std::shared_ptr<const MaterialWindows> windows_;
@@ -254,17 +267,24 @@ class Factored final : public SubsurfaceModel {
     return windows_->pitch_mm() / static_cast<float>(options_.patches_per_pitch);
   }
 
+  // Where the light has an edge, so has the exitance, as sharp as R_d's peak.
+  float ExitanceSpacingMm() const override { return windows_->pitch_mm() / 4; }
+
   Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const override {
     const Vec3 d = (x_o.position_mm - x_i.position_mm) / windows_->pitch_mm();
     ColorLanes sum;
     for (const SamplePlace& place : mapping_.Places(x_i)) {
-      Vec2 at =
-          InWindow({Dot(d, place.tangent_u), -Dot(d, place.tangent_v)}, Dot(d, d));
+      Vec2 plane{Dot(d, place.tangent_u), -Dot(d, place.tangent_v)};
+      float squared = Dot(d, d);
       if (mapping_.mapping() == Mapping::kTexture) {
         const Vec2 along = MaterialMapping::AlongSurface(x_i, x_o);
-        at = {along.x / windows_->pitch_mm(), -along.y / windows_->pitch_mm()};
+        plane = {along.x / windows_->pitch_mm(), -along.y / windows_->pitch_mm()};
+        squared = plane.x * plane.x + plane.y * plane.y;
       }
-      sum += windows_->At(windows_->WindowAt(place.uv), at.x, at.y) * place.weight;
+      const MaterialWindows::Entry entry = windows_->EntryAt(place.uv);
+      const Vec2 cell = InWindow(plane, squared) + entry.beside;
+      sum += windows_->At(entry.window, squared, cell.x, cell.y) * entry.scale *
+             place.weight;
     }
     return {sum.v[0], sum.v[1], sum.v[2]};
   }
@@ -273,7 +293,7 @@ class Factored final : public SubsurfaceModel {
   RadialDensity Spread() const override {
     const double pitch = static_cast<double>(windows_->pitch_mm());
     const double reach =
-        std::numbers::sqrt2 * static_cast<double>(windows_->radius()) * pitch;
+        std::numbers::sqrt2 * (static_cast<double>(windows_->radius()) + 0.5) * pitch;
     constexpr int kPlaces = 4;
     constexpr int kDirections = 16;
     const auto mean = [&](double r_mm) {
@@ -281,13 +301,15 @@ class Factored final : public SubsurfaceModel {
       double sum = 0;
       for (int n = 0; n < kPlaces * kPlaces * kDirections; ++n) {
         const int place = n / kDirections;
-        const int window = windows_->WindowAt(
-            {(static_cast<float>(place % kPlaces) + 0.5F) / kPlaces,
-             (static_cast<float>(place / kPlaces) + 0.5F) / kPlaces});
+        const int window =
+            windows_
+                ->EntryAt({(static_cast<float>(place % kPlaces) + 0.5F) / kPlaces,
+                           (static_cast<float>(place / kPlaces) + 0.5F) / kPlaces})
+                .window;
         const float angle = 2 * std::numbers::pi_v<float> *
                             static_cast<float>(n % kDirections) / kDirections;
         const ColorLanes rd =
-            windows_->At(window, r * std::cos(angle), r * std::sin(angle));
+            windows_->At(window, r * r, r * std::cos(angle), r * std::sin(angle));
         sum += static_cast<double>(rd.v[0] + rd.v[1] + rd.v[2]);
       }
       return sum;
@@ -305,8 +327,15 @@ class Factored final : public SubsurfaceModel {
 
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int /*thread_count*/) const override {
+    // Of projections a point has several places, which overlap: they blur borders.
+    const bool by_uv = mapping_.mapping() == Mapping::kTexture ||
+                       mapping_.mapping() == Mapping::kWorld;
+    const auto part_of = by_uv ? PartFunction([&](const SurfacePoint& p) {
+      return windows_->PartAt(p.uv);
+    })
+                               : PartFunction();
     return std::make_unique<FactoredGather>(
-        windows_, GatherPatches(lit, PatchSizeMm()), mapping_, options_);
+        windows_, GatherPatches(lit, PatchSizeMm(), part_of), mapping_, options_);
   }
 
  private:

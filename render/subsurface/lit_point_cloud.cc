@@ -24,6 +24,7 @@ constexpr float kLatticeShift = 0.3819660F;
 struct KeyedPoint {
   std::uint64_t key;
   const LitPoint* point;
+  int part = 0;
   std::uint64_t Voxel() const { return key >> 3; }
 };
 
@@ -56,7 +57,8 @@ bool IsFinite(const LitPoint& lit) {
 }
 
 std::vector<KeyedPoint> SortIntoVoxels(const std::vector<LitPoint>& lit,
-                                       float side_mm) {
+                                       float side_mm,
+                                       const PartFunction& part_of) {
   std::vector<KeyedPoint> keyed;
   keyed.reserve(lit.size());
   std::array<std::int64_t, 3> low;
@@ -77,7 +79,8 @@ std::vector<KeyedPoint> SortIntoVoxels(const std::vector<LitPoint>& lit,
       low[axis] = std::min(low[axis], voxel[axis]);
       high[axis] = std::max(high[axis], voxel[axis]);
     }
-    keyed.push_back({DominantSide(point.point.normal), &point});
+    keyed.push_back(
+        {DominantSide(point.point.normal), &point, part_of ? part_of(point.point) : 0});
   }
   for (std::size_t axis = 0; axis < 3 && !keyed.empty(); ++axis) {
     if (high[axis] - low[axis] >= (std::int64_t{1} << kBitsPerAxis)) {
@@ -97,7 +100,7 @@ std::vector<KeyedPoint> SortIntoVoxels(const std::vector<LitPoint>& lit,
     }
   }
   std::sort(keyed.begin(), keyed.end(), [](const KeyedPoint& a, const KeyedPoint& b) {
-    return a.key < b.key;
+    return a.key != b.key ? a.key < b.key : a.part < b.part;
   });
   return keyed;
 }
@@ -209,8 +212,9 @@ void ForEachGroup(std::vector<KeyedPoint> keyed, Visitor&& visit) {
     return std::tuple(p.x, p.y, p.z, k.point->area_mm2, e.x, e.y, e.z);
   };
   for (auto begin = keyed.begin(); begin != keyed.end();) {
-    const auto end = std::find_if(
-        begin, keyed.end(), [&](const KeyedPoint& k) { return k.key != begin->key; });
+    const auto end = std::find_if(begin, keyed.end(), [&](const KeyedPoint& k) {
+      return k.key != begin->key || k.part != begin->part;
+    });
     std::sort(begin, end, [&](const KeyedPoint& a, const KeyedPoint& b) {
       return order(a) < order(b);
     });
@@ -221,10 +225,12 @@ void ForEachGroup(std::vector<KeyedPoint> keyed, Visitor&& visit) {
 
 }  // namespace
 
-std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit, float side_mm) {
+std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit,
+                                 float side_mm,
+                                 const PartFunction& part_of) {
   Expect(side_mm > 0, "patches have a positive side");
   std::vector<Patch> patches;
-  ForEachGroup(SortIntoVoxels(lit, side_mm),
+  ForEachGroup(SortIntoVoxels(lit, side_mm, part_of),
                [&](auto members) { patches.push_back(MergePoints(members)); });
   return patches;
 }

@@ -3,6 +3,7 @@
 #include "render/subsurface/subsurface.h"
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 namespace nacre::render {
@@ -24,6 +25,11 @@ struct Patch {
 /// result is the same for any order of the points.
 /// Throws a usage Error for a point that isn't finite, or if the points reach over more
 /// than 2²⁰ voxels.
-std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit, float side_mm);
+///
+/// Points of which `part_of` says different things never share a patch.
+using PartFunction = std::function<int(const SurfacePoint&)>;
+std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit,
+                                 float side_mm,
+                                 const PartFunction& part_of = {});
 
 }  // namespace nacre::render

@@ -72,6 +72,9 @@ class SubsurfaceModel {
   /// pitch.
   virtual float PatchSizeMm() const = 0;
 
+  /// The distance between places from which the exitance may be interpolated.
+  virtual float ExitanceSpacingMm() const { return 2 * PatchSizeMm(); }
+
   /// R_d(x_i, x_o) itself, in mm⁻²: what `Illuminate` gathers, without patches.
   virtual Color Rd(const SurfacePoint& x_i, const SurfacePoint& x_o) const = 0;
 

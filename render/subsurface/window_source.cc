@@ -67,13 +67,8 @@ class DatasetSource final : public WindowSource {
     return Slice(i, j)[static_cast<std::size_t>(channel) * WindowSize() + cell];
   }
   float Albedo(int channel, int i, int j) const override {
-    const std::size_t size = WindowSize();
-    const auto first =
-        Slice(i, j).begin() +
-        static_cast<std::ptrdiff_t>(static_cast<std::size_t>(channel) * size);
-    const double sum =
-        std::accumulate(first, first + static_cast<std::ptrdiff_t>(size), 0.0);
-    return static_cast<float>(sum * pitch_mm * pitch_mm);
+    return Slice(i,
+                 j)[channels.size() * WindowSize() + static_cast<std::size_t>(channel)];
   }
   std::int64_t tiles_read() const override { return read_.load(); }
   std::int64_t tiles_total() const override {
@@ -85,6 +80,7 @@ class DatasetSource final : public WindowSource {
     return static_cast<std::size_t>(core) * static_cast<std::size_t>(core);
   }
 
+  /// The windows of all channels, then their albedos.
   const std::vector<float>& Slice(int i, int j) const {
     auto& slot = slices_[static_cast<std::size_t>(j * points_x + i)];
     if (const auto* known = slot.load(std::memory_order_acquire)) {
@@ -97,6 +93,13 @@ class DatasetSource final : public WindowSource {
     reconstruct::RdSlice slice = reader_.ReadSlice(i, j);
     for (float& value : slice.rd) {
       value = std::max(0.0F, value);  // noise about zero; light doesn't go backwards
+    }
+    for (std::size_t c = 0; c < channels.size(); ++c) {
+      const auto first =
+          slice.rd.begin() + static_cast<std::ptrdiff_t>(c * WindowSize());
+      const double sum = std::accumulate(
+          first, first + static_cast<std::ptrdiff_t>(WindowSize()), 0.0);
+      slice.rd.push_back(static_cast<float>(sum * pitch_mm * pitch_mm));
     }
     auto made = std::make_unique<const std::vector<float>>(std::move(slice.rd));
     slot.store(made.get(), std::memory_order_release);

@@ -58,6 +58,22 @@ TEST(GatherPatches, KeepsTheFacesOfAThinSheetApart) {
   EXPECT_EQ(GatherPatches(lit, 1).size(), 2u);
 }
 
+TEST(GatherPatches, KeepsPartsOfAMaterialApart) {
+  std::vector<LitPoint> lit(3);
+  for (LitPoint& p : lit) {
+    p.point.normal = {0, 0, 1};
+    p.area_mm2 = 1;
+    p.flux_density = {1, 1, 1};
+  }
+  lit[2].point.uv.x = 0.7F;
+  const auto by_u = [](const SurfacePoint& p) { return p.uv.x < 0.5F ? 0 : 1; };
+  EXPECT_EQ(GatherPatches(lit, 1).size(), 1u);
+  const auto patches = GatherPatches(lit, 1, by_u);
+  ASSERT_EQ(patches.size(), 2u);
+  EXPECT_EQ(patches[0].flux_w.x, 2);
+  EXPECT_EQ(patches[1].flux_w.x, 1);
+}
+
 TEST(GatherPatches, NeverAveragesTextureCoordinatesOverASeam) {
   std::vector<LitPoint> lit(2);
   for (std::size_t i = 0; i < 2; ++i) {

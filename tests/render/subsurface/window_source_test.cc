@@ -1,6 +1,8 @@
 #include "render/subsurface/window_source.h"
 
+#include "core/error.h"
 #include "reconstruct/rd_dataset.h"
+#include "render/subsurface/material_windows.h"
 #include "render/subsurface/models.h"
 #include "tests/render/scene_text.h"
 #include "tests/render/subsurface/handmade_material.h"
@@ -88,6 +90,37 @@ TEST(WindowSourceTest, AScenesMaterialMayBeADataset) {
   EXPECT_GT(r.summary.use.tiles, 1);
   EXPECT_EQ(r.summary.use.tiles_total, 64);
   EXPECT_EQ(r.summary.use.channels, 3);
+}
+
+TEST(MakeFactored, TakesOneOrThreeChannels) {
+  factor::Material grey = OneTermMaterial({2, 3, 1.0}, 1);
+  std::fill(grey.h.begin(), grey.h.end(), 0.1F);
+  SetAlbedo(grey);
+  const MaterialWindows windows(
+      MakeMaterialSource(std::make_shared<const factor::Material>(grey)), 1);
+  const ColorLanes rd = windows.At(0, 1, 1, 0);
+  EXPECT_GT(rd.v[0], 0);
+  EXPECT_TRUE(rd.v[0] == rd.v[1] && rd.v[1] == rd.v[2]);
+
+  factor::Material four = OneTermMaterial({2, 3, 1.0}, 4);
+  SetAlbedo(four);
+  EXPECT_THAT(
+      [&] { MakeFactored(std::make_shared<const factor::Material>(four)); },
+      ::testing::ThrowsMessage<Error>(::testing::HasSubstr("4 channels (R, G, B, R)")));
+}
+
+TEST(MakeFactored, ChannelsAreFoundByName) {
+  factor::Material m = OneTermMaterial({2, 3, 1.0}, 3);
+  m.channels = {"B", "G", "R"};
+  for (std::size_t n = 0; n < m.h.size(); ++n) {
+    m.h[n] = 0.01F * static_cast<float>(1 + n / 9);  // B 1, G 2, R 3
+  }
+  SetAlbedo(m);
+  const MaterialWindows windows(
+      MakeMaterialSource(std::make_shared<const factor::Material>(m)), 1);
+  const Color c = windows.Albedo(0);
+  EXPECT_NEAR(c.x / c.z, 3, 1e-4);
+  EXPECT_NEAR(c.y / c.z, 2, 1e-4);
 }
 
 }  // namespace
