@@ -244,13 +244,14 @@ void WriteSlices(const Finishing& finishing,
         if (options.symmetrize) {
           changes[k] = internal::Symmetrize(header, separation, s, slices[k]);
         }
-        finishing.gloss.Remove(s, slices[k]);
-        if (options.specular_radius_cells >= 0) {
-          internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
-        }
+        // First: what scales a slice, as its power's ripple does, scales gloss as well.
         if (options.state_systematics) {
           internal::AddSystematics(
               header, finishing.calibration, finishing.longest_us, slices[k]);
+        }
+        finishing.gloss.Remove(s, slices[k]);
+        if (options.specular_radius_cells >= 0) {
+          internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
         }
         below[k] = internal::MarkBelowFloor(header, separation.Floor(s), slices[k]);
         dims[k] = finishing.advice.Look(slices[k]);

@@ -42,7 +42,9 @@ void AddSystematics(const RdHeader& header,
     const double flux = calibration.channels[c].flux_scale_sigma;
     const double ripple = calibration.corrections.light_noise.ripple;
     const double flat = calibration.corrections.flat_field.sigma;
-    const auto scale2 = static_cast<float>(flux * flux + ripple * ripple + flat * flat);
+    const double speckle = calibration.corrections.light_noise.speckle_contrast / rows;
+    const auto scale2 = static_cast<float>(flux * flux + ripple * ripple + flat * flat +
+                                           speckle * speckle);
     const double row =
         calibration.RdPerRate(static_cast<int>(c), {0, 0}, {0, 0}, header.eta) *
         calibration.corrections.row_noise_counts / longest_us;
