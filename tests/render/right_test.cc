@@ -1,6 +1,8 @@
 // The bars of "right": fast is reference, and tessellation doesn't show.
 
+#include "core/fresnel.h"
 #include "render/lit_points.h"
+#include "render/subsurface/dipole_profile.h"
 #include "tests/render/bias.h"
 #include "tests/render/mesh_subdivision.h"
 #include "tests/render/scene_text.h"
@@ -45,6 +47,46 @@ TEST(RightTest, FastIsReferenceOnSlabSphereAndCube) {
                                  Picture(scene, "reference", 4096, 4));
     EXPECT_LT(d.noise, 0.02) << shape;
     EXPECT_LT(d.bias, 0.01) << shape << " (at most " << d.bound << ")";
+  }
+}
+
+// Of a half-space, all that enters leaves times the dipole's total, whichever way it
+// came: L_o = Φ R F_t(η, 0) / (π c). The slab is 80 mm wide, which R_d can't leave.
+TEST(RightTest, AHalfSpaceUnderEvenLightSendsBackTheIntegralOfTheDipole) {
+  const char* const slab = R"(<shape type="rectangle">
+    <transform name="toWorld"><scale value="40"/></transform>
+    <subsurface type="dipole"><rgb name="sigmaS" value="1, 2, 3"/>
+      <rgb name="sigmaA" value="0.3, 0.2, 0.2"/><float name="intIOR" value="1.5"/>
+    </subsurface></shape>)";
+  const double inside = DiffuseFresnelReflectance(1 / 1.5);
+  const double transmitted = FresnelTransmittance(1, 1.5);
+  struct Light {
+    const char* text;
+    double entering;
+  };
+  for (const Light& light :
+       {Light{R"(<emitter type="constant"><rgb name="radiance" value="1"/></emitter>)",
+              std::numbers::pi * ExitNormalization(1.5)},
+        Light{
+            R"(<emitter type="directional"><vector name="direction" x="0" y="0" z="-1"/>
+                <rgb name="irradiance" value="1"/></emitter>)",
+            transmitted}}) {
+    Scene scene =
+        Parse(SceneText(std::string(slab) + light.text, "0, 0, 50", "0, 0, 0", 4));
+    scene.camera.half_width = 0.02F;
+    const ExrPart image = Picture(scene, "fast", 64, 1);
+    const std::array<double, 3> sigma_s{1, 2, 3};
+    const std::array<double, 3> sigma_a{0.3, 0.2, 0.2};
+    for (std::size_t c = 0; c < 3; ++c) {
+      const double expected = light.entering *
+                              DipoleProfile(sigma_a[c], sigma_s[c], inside).Total() *
+                              transmitted / (std::numbers::pi * ExitNormalization(1.5));
+      double mean = 0;
+      for (std::size_t i = 0; i < image.PixelCount(); ++i) {
+        mean += static_cast<double>(image.Channel(c)[i]) / 16;
+      }
+      EXPECT_NEAR(mean, expected, 0.005 * expected) << light.text << c;
+    }
   }
 }
 
