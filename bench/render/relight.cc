@@ -11,10 +11,11 @@
 #include "core/exr.h"
 #include "core/fresnel.h"
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <numbers>
+
+#include "bench/render/scene_tool.h"
 
 namespace nacre {
 namespace {
@@ -61,14 +62,6 @@ int main(int argc, char** argv) {
   app.add_option("photo", photo)->required();
   app.add_option("--eta", eta);
   app.add_option("--scale", scale);
-  try {
-    app.parse(argc, argv);
-    nacre::Run(rendered, photo, eta, scale);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "relight: %s\n", e.what());
-    return 1;
-  }
-  return 0;
+  return nacre::render::RunTool(
+      app, argc, argv, [&] { nacre::Run(rendered, photo, eta, scale); });
 }

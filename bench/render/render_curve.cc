@@ -13,11 +13,12 @@
 #include "core/exr.h"
 #include "render/render.h"
 
-#include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <optional>
+
+#include "bench/render/scene_tool.h"
 
 namespace nacre::render {
 namespace {
@@ -65,12 +66,7 @@ void PrintTimeTo(const std::vector<Row>& rows, double error) {
 }
 
 void Run(const Arguments& arguments) {
-  SceneOptions scene_options;
-  for (const std::string& define : arguments.defines) {
-    const std::size_t equals = define.find('=');
-    scene_options.defines[define.substr(0, equals)] = define.substr(equals + 1);
-  }
-  const Scene scene = ReadScene(arguments.scene, scene_options);
+  const Scene scene = ReadDefined(arguments.scene, arguments.defines);
   RenderOptions options;
   options.thread_count = arguments.thread_count;
   ExrPart truth;
@@ -82,7 +78,7 @@ void Run(const Arguments& arguments) {
     options.points_per_patch = 64;
     options.max_lit_points = 2e7;
     options.lazy = false;
-    options.exitance_spacing = 1;
+    options.exitance_spacing = 0.5;
     options.seed = 20261122;
     truth = Render(scene, options).image;
     if (!arguments.truth.empty()) {
@@ -133,14 +129,6 @@ int main(int argc, char** argv) {
   app.add_option("--threads", arguments.thread_count);
   app.add_flag("--adaptive", arguments.adaptive);
   app.add_option("-D", arguments.defines)->allow_extra_args(false);
-  try {
-    app.parse(argc, argv);
-    nacre::render::Run(arguments);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "render_curve: %s\n", e.what());
-    return 1;
-  }
-  return 0;
+  return nacre::render::RunTool(
+      app, argc, argv, [&] { nacre::render::Run(arguments); });
 }

@@ -12,9 +12,10 @@
 #include "render/render.h"
 #include "tests/render/bias.h"
 
-#include <CLI/CLI.hpp>
 #include <cstdio>
 #include <filesystem>
+
+#include "bench/render/scene_tool.h"
 
 namespace nacre::render {
 namespace {
@@ -25,7 +26,7 @@ struct Arguments {
   int fast_spp = 64;
   int reference_spp = 1024;
   int thread_count = 1;
-  double spacing = 2;  ///< exitance_spacing, points_per_patch and not lazy, of fast
+  double spacing = 1;  ///< exitance_spacing, points_per_patch and not lazy, of fast
   double points = 16;
   bool everywhere = false;
   std::vector<std::string> defines;
@@ -39,16 +40,11 @@ ExrPart Mean(ExrPart a, const ExrPart& b) {
 }
 
 void Run(const Arguments& arguments) {
-  SceneOptions scene_options;
-  for (const std::string& define : arguments.defines) {
-    const std::size_t equals = define.find('=');
-    scene_options.defines[define.substr(0, equals)] = define.substr(equals + 1);
-  }
   std::printf(
       "| scene | fast | reference | difference | of it noise | bias | at most |\n"
       "|---|---|---|---|---|---|---|\n");
   for (const std::string& path : arguments.scenes) {
-    const Scene scene = ReadScene(path, scene_options);
+    const Scene scene = ReadDefined(path, arguments.defines);
     double fast_s = 0;
     double reference_s = 0;
     const auto render =
@@ -107,14 +103,6 @@ int main(int argc, char** argv) {
   app.add_flag("--everywhere", arguments.everywhere);
   app.add_option("--out", arguments.out);
   app.add_option("-D", arguments.defines)->allow_extra_args(false);
-  try {
-    app.parse(argc, argv);
-    nacre::render::Run(arguments);
-  } catch (const CLI::ParseError& e) {
-    return app.exit(e);
-  } catch (const std::exception& e) {
-    std::fprintf(stderr, "render_right: %s\n", e.what());
-    return 1;
-  }
-  return 0;
+  return nacre::render::RunTool(
+      app, argc, argv, [&] { nacre::render::Run(arguments); });
 }
