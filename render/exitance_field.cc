@@ -82,10 +82,12 @@ std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
 
 ExitanceField::ExitanceField(const Shape& shape,
                              std::unique_ptr<const Subsurface> subsurface,
-                             float spacing_mm)
+                             float spacing_mm,
+                             float blurred_mm)
     : shape_(shape),
       subsurface_(std::move(subsurface)),
-      mm_per_unit_(shape.translucency->mm_per_unit) {
+      mm_per_unit_(shape.translucency->mm_per_unit),
+      blurred_mm_(blurred_mm) {
   if (!(spacing_mm > 0)) {
     return;
   }
@@ -115,12 +117,12 @@ void ExitanceField::PlanMesh(const TriangleMesh& mesh, float spacing) {
     }
   }
   vertices_ = VertexPoints(shape_, mm_per_unit_);
-  ChooseForBlurred(spacing * mm_per_unit_);
+  ChooseForBlurred();
   Allocate(next);
 }
 
 // One vertex for all in a cell that face the same way: the nearest to their middle.
-void ExitanceField::ChooseForBlurred(float spacing_mm) {
+void ExitanceField::ChooseForBlurred() {
   struct Member {
     std::uint64_t cell;
     std::uint32_t vertex;
@@ -128,7 +130,7 @@ void ExitanceField::ChooseForBlurred(float spacing_mm) {
       return cell != b.cell ? cell < b.cell : vertex < b.vertex;
     }
   };
-  const float per_mm = 1 / (static_cast<float>(kCoarse) * spacing_mm);
+  const float per_mm = 1 / blurred_mm_;
   std::vector<Member> members;
   members.reserve(vertices_.size());
   for (std::size_t i = 0; i < vertices_.size(); ++i) {

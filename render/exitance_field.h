@@ -18,11 +18,13 @@ namespace nacre::render {
 /// grid a triangle; on a sphere it is longitude and latitude.
 class ExitanceField final : public ExitanceSource {
  public:
-  /// `spacing_mm`: at most this far apart; 0 asks the model at every hit. The
+  /// `spacing_mm`: at most this far apart; 0 asks the model at every hit. Of vertices
+  /// within a cell `blurred_mm` wide, one stands for all in what is blurred. The
   /// references must outlive it.
   ExitanceField(const Shape& shape,
                 std::unique_ptr<const Subsurface> subsurface,
-                float spacing_mm);
+                float spacing_mm,
+                float blurred_mm);
 
   /// At a hit of the shape. What is dim may be a grid's spacing off; what is blurred
   /// may come from anywhere within a few of them, so that there is less to ask.
@@ -43,7 +45,7 @@ class ExitanceField final : public ExitanceSource {
   void PlanMesh(const TriangleMesh& mesh, float spacing);
   void PlanSphere(const Sphere& sphere, float spacing);
   void Allocate(std::int64_t count);
-  void ChooseForBlurred(float spacing_mm);
+  void ChooseForBlurred();
 
   Color AtCorner(const SurfaceHit& hit, Sight sight, PathCounters& counters) const;
   Color AtCoarseNode(const SurfaceHit& hit, PathCounters& counters) const;
@@ -61,6 +63,7 @@ class ExitanceField final : public ExitanceSource {
   const Shape& shape_;
   std::unique_ptr<const Subsurface> subsurface_;
   float mm_per_unit_;
+  float blurred_mm_;
   std::int64_t grid_size_ = 0;
   std::unique_ptr<Value[]> values_;
   // Meshes: divisions of a triangle's sides and its first slot (if more than 1).

@@ -42,6 +42,9 @@ void TraceSeeingPaths(const World& world,
       });
 }
 
+// What is blurred may come from anywhere within so many patches.
+constexpr float kBlurredPatches = 8;
+
 }  // namespace
 
 Exitances::Exitances(const World& world,
@@ -126,7 +129,8 @@ void Exitances::Illuminate(std::uint32_t shape,
   owned_[shape] = std::make_unique<ExitanceField>(
       lit_shape,
       model.Illuminate(std::move(points.points), options.thread_count),
-      static_cast<float>(options.exitance_spacing) * model.ExitanceSpacingMm());
+      static_cast<float>(options.exitance_spacing) * model.ExitanceSpacingMm(),
+      kBlurredPatches * model.PatchSizeMm());
   summary.models_s += model_time.Seconds();
 }
 
