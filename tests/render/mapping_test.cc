@@ -53,9 +53,9 @@ Scene Lit(const std::string& shape,
 
 ExrPart Picture(const Scene& scene, std::uint64_t seed = 1) {
   RenderOptions options;
-  options.spp = 64;
+  options.spp = 16;
   options.seed = seed;
-  options.points_per_patch = 64;
+  options.points_per_patch = 32;
   return Render(scene, options).image;
 }
 
