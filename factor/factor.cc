@@ -5,6 +5,7 @@
 #include "core/provenance.h"
 #include "factor/internal/auto_method.h"
 #include "factor/internal/bilinear_data.h"
+#include "factor/internal/grey.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reciprocal_data.h"
 #include "factor/internal/terms_search.h"
@@ -153,15 +154,26 @@ Factorization FactorSource(SliceSource& source,
   }
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
-  const std::int64_t working_bytes = WorkingBytes(source.header(), options);
-  internal::Job job{source, options, progress, clusterer, {}, {}};
+  const std::vector<std::string> channels = source.header().channels;
+  const bool is_grey = options.method != "tucker" && internal::HasEqualChannels(source);
+  internal::FirstChannel first(source);
+  SliceSource& used = is_grey ? first : source;
+  const std::int64_t working_bytes = WorkingBytes(used.header(), options);
+  internal::Job job{used, options, progress, clusterer, {}, {}};
   internal::Look(job);
   const std::unique_ptr<internal::Method> method = make(job);
   Factorization result = internal::SearchTerms(
       job, *method, [&](const FactorSummary& found, Material& material) {
         DescribeMaterial(options, source.header(), found, material);
+        if (is_grey) {
+          internal::SpreadChannels(channels, material);
+        }
       });
   FactorSummary& summary = result.summary;
+  if (is_grey) {
+    summary.dataset_bytes *= std::ssize(channels);
+    summary.notes.push_back("all channels are the same: factored and stored once");
+  }
   summary.working_bytes = working_bytes;
   summary.passes = job.passes;
   AddNotes(options, source.header().PointCount(), method->MostTerms(), summary);

@@ -194,12 +194,13 @@ Material WithoutSides(Material m) {
   const auto kept = static_cast<std::size_t>(m.KernelCount() - 1) *
                     static_cast<std::size_t>(m.KernelSize());
   std::vector<float> h;
-  for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
+  for (int c = 0; c < m.KernelSets(); ++c) {
     h.insert(h.end(), m.Kernel(c, 0, 0), m.Kernel(c, 0, 0) + kept);
   }
   m.h = std::move(h);
-  m.f.resize(static_cast<std::size_t>(m.terms * m.MapSize()));
-  m.steps.f.resize(m.steps.empty() ? 0 : static_cast<std::size_t>(m.terms));
+  const int maps = m.terms + m.rest;
+  m.f.resize(static_cast<std::size_t>(maps * m.MapSize()));
+  m.steps.f.resize(m.steps.empty() ? 0 : static_cast<std::size_t>(maps));
   m.sides = 0;
   return m;
 }
@@ -240,6 +241,7 @@ void Validate(const Material& m, const std::string& origin) {
   check.Require(m.sides == 0 || (m.sides == 1 && m.form == Form::kReciprocal),
                 "sides",
                 fmt::format("{}", m.sides));
+  check.Require(!m.is_grey || m.form != Form::kTucker, "is_grey", "set for tucker");
   check.Require(
       m.rest == 0 || (m.rest > 0 && m.rest <= 256 && m.form == Form::kReciprocal),
       "rest",

@@ -81,6 +81,9 @@ struct Material {
   int rest = 0;    ///< maps and kernels of pairs, after those of terms (kReciprocal)
   int sides = 0;   ///< 1: map q and kernels g are there, after the others (kReciprocal)
 
+  /// All channels are the same, and share maps and kernels (not kTucker).
+  bool is_grey = false;
+
   std::vector<double> a;  ///< A a channel (kLog, kReciprocal)
   std::vector<double> b;  ///< B a channel (kLog)
   /// [channel][term][j][i]; shared: [term][j][i], with margin on all sides; kTucker:
@@ -108,7 +111,9 @@ struct Material {
   std::int64_t MapSize() const { return std::int64_t{MapWidth()} * MapHeight(); }
   /// Sets of factor maps: one a channel, or one for all.
   int MapSets() const { return SharesMaps() ? 1 : static_cast<int>(channels.size()); }
-  bool SharesMaps() const { return form != Form::kSum && form != Form::kProfiles; }
+  bool SharesMaps() const {
+    return is_grey || (form != Form::kSum && form != Form::kProfiles);
+  }
   /// Maps of a set: one a term, but for kTucker.
   int MapCount() const {
     return form == Form::kTucker
@@ -117,8 +122,9 @@ struct Material {
   }
   /// Sets of kernels: one a channel, or one for all.
   int KernelSets() const {
-    return form == Form::kTucker ? 1 : static_cast<int>(channels.size());
+    return SharesKernels() ? 1 : static_cast<int>(channels.size());
   }
+  bool SharesKernels() const { return is_grey || form == Form::kTucker; }
   /// Whether row_scale makes the totals of slices exact.
   bool KeepsTotals() const { return form == Form::kSum || form == Form::kTucker; }
   /// Kernels of a channel and cluster.

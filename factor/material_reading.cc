@@ -168,6 +168,7 @@ Material ReadAttributes(const AttributeReader& attributes) {
   }
   if (version == internal::kVersion) {
     m.rest = ParseCount(attributes, "rest", 256);
+    m.is_grey = ParseCount(attributes, "grey", 1) == 1;
   }
   if (has_order) {
     m.order = ParseCount(attributes, "order", 8);

@@ -66,6 +66,7 @@ ExrAttributes AttributesOf(const Material& m) {
           {"nacre.order", std::to_string(m.order)},
           {"nacre.rest", std::to_string(m.rest)},
           {"nacre.sides", std::to_string(m.sides)},
+          {"nacre.grey", m.is_grey ? "1" : "0"},
           {"nacre.transform", Name(m.transform)},
           {"nacre.points", fmt::format("{} {}", m.points_x, m.points_y)},
           {"nacre.core", std::to_string(m.core)},

@@ -14,7 +14,7 @@ const std::vector<std::string>& MapChannels(const Material& m) {
 }
 
 const std::vector<std::string>& KernelChannels(const Material& m) {
-  return m.form == Form::kTucker ? SharedChannel() : m.channels;
+  return m.SharesKernels() ? SharedChannel() : m.channels;
 }
 
 Layout LayoutOf(const Material& m) {

@@ -127,6 +127,38 @@ void AddTotal(double measured, double modelled, SliceFit& fit) {
   }
 }
 
+// Of their totals.
+SliceFit WorstOf(const std::vector<SliceFit>& fits) {
+  SliceFit all;
+  for (const SliceFit& fit : fits) {
+    all.worst_total = std::max(all.worst_total, fit.worst_total);
+    all.unfit += fit.unfit;
+  }
+  return all;
+}
+
+// Albedo of all slices of a reciprocal material, and how far their totals are off.
+SliceFit SumAll(const Job& job, Material& m) {
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  const std::int64_t points = m.PointCount();
+  std::vector<SliceFit> fits(static_cast<std::size_t>(points));
+  ParallelFor(points, job.options.thread_count, [&](std::int64_t point) {
+    std::vector<float> values(window * m.channels.size());
+    const GridIndex index{static_cast<int>(point % m.points_x),
+                          static_cast<int>(point / m.points_x)};
+    ScaledReciprocalWindows(m, index, values.data());
+    for (std::size_t c = 0; c < m.channels.size(); ++c) {
+      const double total =
+          std::accumulate(&values[c * window], &values[c * window] + window, 0.0);
+      const std::size_t at =
+          c * static_cast<std::size_t>(points) + static_cast<std::size_t>(point);
+      m.albedo[at] = RoundAlbedo(total * m.pitch_mm * m.pitch_mm, !m.steps.empty());
+      AddTotal(job.totals[at], total, fits[static_cast<std::size_t>(point)]);
+    }
+  });
+  return WorstOf(fits);
+}
+
 // row_scale and albedo of all slices by the totals that the fit left.
 SliceFit ScaleAll(const Job& job, Material& m) {
   constexpr std::int64_t kBlock = 256;
@@ -149,17 +181,12 @@ SliceFit ScaleAll(const Job& job, Material& m) {
       AddTotal(job.totals[at], scaled, fits[static_cast<std::size_t>(task)]);
     }
   });
-  SliceFit all;
-  for (const SliceFit& fit : fits) {
-    all.worst_total = std::max(all.worst_total, fit.worst_total);
-    all.unfit += fit.unfit;
-  }
-  return all;
+  return WorstOf(fits);
 }
 
 // Totals are those of all slices; errors are measured on some.
 void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
-  const SliceFit all = ScaleAll(job, m);
+  const SliceFit all = m.form == Form::kReciprocal ? SumAll(job, m) : ScaleAll(job, m);
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const double floor = reconstruct::kLogFloor * job.Peak();
   const reconstruct::RdDataset& data = job.check.dataset;

@@ -27,6 +27,9 @@ Sample TakeSample(SliceSource& source, int wanted, std::uint64_t seed) {
     reconstruct::RdDataset& to = sample.dataset;
     to.rd.insert(to.rd.end(), block.rd, block.rd + size);
     to.valid.insert(to.valid.end(), block.valid, block.valid + size);
+    if (block.sigma != nullptr) {
+      to.sigma.insert(to.sigma.end(), block.sigma, block.sigma + size);
+    }
   }
   return sample;
 }
@@ -50,12 +53,18 @@ Sample Thin(const Sample& from, std::int64_t wanted) {
     };
     add(from.dataset.rd, thin.dataset.rd);
     add(from.dataset.valid, thin.dataset.valid);
+    if (!from.dataset.sigma.empty()) {
+      add(from.dataset.sigma, thin.dataset.sigma);
+    }
   }
   return thin;
 }
 
 bool OneReadingMayDo(const reconstruct::RdHeader& header,
                      const FactorOptions& options) {
+  if (options.method == "reciprocal") {
+    return header.PointCount() >= 2 * kSvdSampleRows && options.check_slices > 0;
+  }
   const bool is_svd = options.method == "log-svd" || options.method == "svd" ||
                       options.method == "sqrt-svd";
   return is_svd && options.clusters == 1 && options.check_slices > 0 &&

@@ -276,4 +276,16 @@ float PairScale(const Material& m, int channel, GridIndex point, GridIndex cell)
   return at(point.x, point.y) * (on_grid ? at(x, y) : 1.0F);
 }
 
+void ScaledReciprocalWindows(const Material& m, GridIndex point, float* windows) {
+  const auto channels = static_cast<int>(m.channels.size());
+  ReciprocalWindows(m, point, 0, channels, windows);
+  for (int c = 0; c < channels; ++c) {
+    for (int v = 0; v < m.core; ++v) {
+      for (int u = 0; u < m.core; ++u) {
+        *windows++ *= PairScale(m, c, point, {u, v});
+      }
+    }
+  }
+}
+
 }  // namespace nacre::factor::internal

@@ -21,4 +21,7 @@ void ReciprocalWindows(const Material& m,
 /// row_scale(x_i) · row_scale(x_o), which is taken as 1 for x_o beyond the grid.
 float PairScale(const Material& m, int channel, GridIndex point, GridIndex cell);
 
+/// ReciprocalWindows of all channels, row_scale at both ends included.
+void ScaledReciprocalWindows(const Material& m, GridIndex point, float* windows);
+
 }  // namespace nacre::factor::internal

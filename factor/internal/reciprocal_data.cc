@@ -14,7 +14,7 @@ constexpr double kTolerance = 0.01;  // of the peak, at the peak
 constexpr double kFaintest = 1e-5;   // peaks
 constexpr double kSidesBytes =
     12 * 4 * 4;                     // near offsets, values and weights both ways
-constexpr double kMostPairs = 2e7;  // more take minutes, and tell no more of the maps
+constexpr double kMostPairs = 1e7;  // more take minutes, and tell no more of the maps
 // Values and weights, and linearised weights or what FitRest holds: floats.
 double BytesAPair(const ReciprocalLimits& limits) {
   return limits.rest ? 4 * 4 : 3 * 4;
@@ -185,6 +185,78 @@ class PairAdder {
   float* sample_weight_ = nullptr;
 };
 
+// Calls work(block) for all slices.
+template <class Work>
+void ForBlocks(Job& job, const char* note, Work&& work) {
+  const std::int64_t points = job.source.header().PointCount();
+  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+    Report(job.progress, {"factor", first, points, note});
+    work(job.source.Read(first, std::min(kBlockRows, points - first)));
+  }
+  ++job.passes;
+}
+
+// Of the slices that stand for all.
+std::vector<Sums> SampleSums(const Job& job, const ReciprocalData& data) {
+  const reconstruct::RdDataset& sample = job.check.dataset;
+  const auto window = static_cast<std::size_t>(sample.header.WindowSize());
+  std::vector<Sums> sums(data.channels * data.cells);
+  for (std::size_t n = 0; n < sample.rd.size(); ++n) {
+    if (sample.valid[n] == 0) {
+      continue;
+    }
+    const std::size_t channel = n / window % data.channels;
+    const std::size_t cell = n % window;
+    double sigma = sample.sigma.empty() ? 0 : static_cast<double>(sample.sigma[n]);
+    if (!(sigma > 0)) {
+      sigma = NoiseFloor(job.scans[channel]);
+    }
+    const double scale = 1 / data.scale[channel];
+    Sums& sum = sums[channel * data.cells + std::min(cell, window - 1 - cell)];
+    sum.value += static_cast<double>(sample.rd[n]) * scale;
+    sum.squared_sigma += sigma * sigma * scale * scale;
+    sum.used += 1;
+  }
+  return sums;
+}
+
+void SetMeans(const Job& job, const std::vector<Sums>& sums, ReciprocalData& data) {
+  for (std::size_t n = 0; n < sums.size(); ++n) {
+    const std::size_t c = n / data.cells;
+    const Sums& sum = sums[n];
+    const double used = std::max(sum.used, 1.0);
+    // Offsets that no pair has are as their ring.
+    data.mean.push_back(sum.used > 0
+                            ? sum.value / used
+                            : job.scans[c].mean[n % data.cells] / data.scale[c]);
+    data.noise.push_back(std::sqrt(sum.squared_sigma / used));
+  }
+}
+
+// Adds up slices into the job's totals. Returns whether all of them was measured.
+bool AddTotals(Job& job, const SliceBlock& block) {
+  const reconstruct::RdHeader& header = job.source.header();
+  const std::int64_t window = header.WindowSize();
+  const auto channels = std::ssize(header.channels);
+  std::vector<std::uint8_t> complete(static_cast<std::size_t>(block.count), 1);
+  ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
+    for (std::int64_t c = 0; c < channels; ++c) {
+      const std::int64_t at = row * header.SliceSize() + c * window;
+      double total = 0;
+      for (std::int64_t cell = 0; cell < window; ++cell) {
+        if (block.valid[at + cell] == 0) {
+          complete[static_cast<std::size_t>(row)] = 0;
+        } else {
+          total += static_cast<double>(block.rd[at + cell]);
+        }
+      }
+      job.totals[static_cast<std::size_t>(c * header.PointCount() + block.first +
+                                          row)] = total;
+    }
+  });
+  return std::find(complete.begin(), complete.end(), 0) == complete.end();
+}
+
 }  // namespace
 
 PlaneArea AreaOf(const ReciprocalData& data, std::size_t cell) {
@@ -211,7 +283,9 @@ double ReciprocalBytes(const reconstruct::RdHeader& header,
   return BytesAPair(limits) * PlaneSize(header) * channels * held + sample + sides;
 }
 
-ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
+ReciprocalData ReadReciprocal(Job& job,
+                              const ReciprocalLimits& limits,
+                              SharedMaps& start) {
   const reconstruct::RdHeader& header = job.source.header();
   ReciprocalData data;
   data.margin = header.Radius();
@@ -240,12 +314,17 @@ ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
   }
   const std::vector<int> near = limits.sides ? NearCells(data) : std::vector<int>{};
   std::vector<PairSides> sides(near.size() * data.channels, PairSides(data.Plane()));
+  const bool once = !job.check.rows.empty();
   std::vector<Sums> sums(data.channels * data.cells);
-  const std::int64_t points = header.PointCount();
-  for (std::int64_t first = 0; first < points; first += kBlockRows) {
-    Report(job.progress, {"factor", first, points, "pairs"});
-    const SliceBlock block =
-        job.source.Read(first, std::min(kBlockRows, points - first));
+  std::unique_ptr<StartingMaps> starting;
+  if (once) {
+    SetMeans(job, SampleSums(job, data), data);
+    starting = std::make_unique<StartingMaps>(job, data, limits.terms);
+    job.totals.assign(data.channels * static_cast<std::size_t>(header.PointCount()),
+                      0.0);
+  }
+  bool complete = true;
+  ForBlocks(job, "pairs", [&](const SliceBlock& block) {
     ParallelFor(std::ssize(sums), job.options.thread_count, [&](std::int64_t n) {
       const auto at = static_cast<std::size_t>(n);
       const std::size_t channel = at / data.cells;
@@ -258,22 +337,31 @@ ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits) {
       }
       PairAdder(job, channel, cell, both, data).Add(block, sums[at]);
     });
+    if (once) {
+      complete = AddTotals(job, block) && complete;
+      starting->Add(block);
+    }
+  });
+  if (once && !std::all_of(job.totals.begin(), job.totals.end(), [](double total) {
+        return std::isfinite(total);
+      })) {
+    LookAtAll(job);  // says where
   }
-  ++job.passes;
   if (limits.sides) {
     FitSides(sides, job.options.thread_count, data);
     MergeSides(sides, data);
   }
-  for (std::size_t n = 0; n < sums.size(); ++n) {
-    const std::size_t c = n / data.cells;
-    const Sums& sum = sums[n];
-    const double used = std::max(sum.used, 1.0);
-    // Offsets that no pair has are as their ring.
-    data.mean.push_back(sum.used > 0
-                            ? sum.value / used
-                            : job.scans[c].mean[n % data.cells] / data.scale[c]);
-    data.noise.push_back(std::sqrt(sum.squared_sigma / used));
+  if (once) {
+    start = starting->Finish();
+    if (!complete) {
+      job.totals.clear();
+    }
+    return data;
   }
+  SetMeans(job, sums, data);
+  StartingMaps maps(job, data, limits.terms);
+  ForBlocks(job, "starting maps", [&](const SliceBlock& block) { maps.Add(block); });
+  start = maps.Finish();
   return data;
 }
 

@@ -4,6 +4,7 @@
 #include "factor/internal/shared_maps.h"
 
 #include <cstddef>
+#include <memory>
 #include <vector>
 
 namespace nacre::factor::internal {
@@ -100,12 +101,29 @@ ReciprocalLimits LimitsOf(const FactorOptions& options);
 double ReciprocalBytes(const reconstruct::RdHeader& header,
                        const ReciprocalLimits& limits);
 
-/// Reads a dataset as pairs, in one pass.
-ReciprocalData ReadReciprocal(Job& job, const ReciprocalLimits& limits);
+/// Reads a dataset as pairs, in one pass. Where the job has slices that stand for all,
+/// `start` comes of the same pass, and so do the job's totals, unless something wasn't
+/// measured.
+ReciprocalData ReadReciprocal(Job& job,
+                              const ReciprocalLimits& limits,
+                              SharedMaps& start);
 
 /// Maps to begin with: coordinates of the slices' logarithms, all channels in a row, in
-/// the leading singular vectors of the sample's; one pass. Fewer than `terms` rows if
-/// there are no more to rounding.
-SharedMaps StartingMaps(Job& job, const ReciprocalData& data, int terms);
+/// the leading singular vectors of the sample's.
+class StartingMaps {
+ public:
+  /// From `data.mean` and `data.noise`. Fewer than `terms` maps if there are no more to
+  /// rounding.
+  StartingMaps(const Job& job, const ReciprocalData& data, int terms);
+  ~StartingMaps();
+  /// The slices' coordinates.
+  void Add(const SliceBlock& block);
+  /// Gives them, what lies beyond the grid as its nearest point.
+  SharedMaps Finish();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 }  // namespace nacre::factor::internal

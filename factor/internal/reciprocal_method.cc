@@ -16,9 +16,7 @@ namespace {
 class ReciprocalMethod final : public Method {
  public:
   explicit ReciprocalMethod(Job& job)
-      : job_(job),
-        data_(ReadReciprocal(job, LimitsOf(job.options))),
-        start_(StartingMaps(job, data_, job.options.terms)) {}
+      : job_(job), data_(ReadReciprocal(job, LimitsOf(job.options), start_)) {}
 
   int MostTerms() const override { return static_cast<int>(start_.rows()); }
 
@@ -59,7 +57,7 @@ class ReciprocalMethod final : public Method {
     if (!data_.HoldsAll()) {
       summary.notes.push_back(fmt::format(
           "maps are fitted to {} of {} offsets, as memory allows (option memory_mb), "
-          "and to 20 million pairs at most",
+          "and to 10 million pairs at most",
           data_.held.size(),
           data_.cells));
     }
@@ -80,8 +78,8 @@ class ReciprocalMethod final : public Method {
   }
 
   Job& job_;
+  SharedMaps start_;  // before the data, with which it is read
   ReciprocalData data_;
-  SharedMaps start_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace nacre::factor::internal {
 namespace {
@@ -54,41 +55,61 @@ class LogRows {
 
 }  // namespace
 
-SharedMaps StartingMaps(Job& job, const ReciprocalData& data, int terms) {
-  const reconstruct::RdHeader& header = job.source.header();
-  const LogRows rows(data, header);
+struct StartingMaps::State {
+  const ReciprocalData& data;
+  const reconstruct::RdHeader& header;
+  int thread_count;
+  LogRows rows;
+  Eigen::RowVectorXd mean;
+  Eigen::MatrixXd basis;
+  SharedMaps maps;
+};
+
+StartingMaps::~StartingMaps() = default;
+
+StartingMaps::StartingMaps(const Job& job, const ReciprocalData& data, int terms)
+    : state_(new State{data,
+                       job.source.header(),
+                       job.options.thread_count,
+                       LogRows(data, job.source.header()),
+                       {},
+                       {},
+                       {}}) {
+  State& s = *state_;
   const reconstruct::RdDataset& sample = job.sample.dataset;
-  RowMatrix y(std::ssize(job.sample.rows), header.SliceSize());
+  RowMatrix y(std::ssize(job.sample.rows), s.header.SliceSize());
   for (Eigen::Index row = 0; row < y.rows(); ++row) {
-    const auto at = static_cast<std::size_t>(row * header.SliceSize());
-    rows.Make(&sample.rd[at], &sample.valid[at], &y(row, 0));
+    const auto at = static_cast<std::size_t>(row * s.header.SliceSize());
+    s.rows.Make(&sample.rd[at], &sample.valid[at], &y(row, 0));
   }
-  const Eigen::RowVectorXd mean = y.colwise().mean();
-  y.rowwise() -= mean;
-  const Eigen::MatrixXd basis = y.cwiseAbs().maxCoeff() > 1e-9
-                                    ? ComputeTruncatedSvd(y, terms).basis
-                                    : Eigen::MatrixXd(y.cols(), 0);
-  SharedMaps maps = SharedMaps::Zero(std::max<Eigen::Index>(basis.cols(), 1),
-                                     static_cast<Eigen::Index>(data.Plane()));
-  const std::int64_t points = header.PointCount();
-  for (std::int64_t first = 0; basis.cols() > 0 && first < points;
-       first += kBlockRows) {
-    Report(job.progress, {"factor", first, points, "starting maps"});
-    const SliceBlock block =
-        job.source.Read(first, std::min(kBlockRows, points - first));
-    ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
-      Eigen::VectorXd slice(header.SliceSize());
-      const std::int64_t at = row * header.SliceSize();
-      rows.Make(block.rd + at, block.valid + at, slice.data());
-      const std::int64_t point = first + row;
-      const std::int64_t to = (point / header.points_x + data.margin) * data.width +
-                              point % header.points_x + data.margin;
-      maps.col(to) = (basis.transpose() * (slice - mean.transpose())).cast<float>();
-    });
+  s.mean = y.colwise().mean();
+  y.rowwise() -= s.mean;
+  s.basis = y.cwiseAbs().maxCoeff() > 1e-9 ? ComputeTruncatedSvd(y, terms).basis
+                                           : Eigen::MatrixXd(y.cols(), 0);
+  s.maps = SharedMaps::Zero(std::max<Eigen::Index>(s.basis.cols(), 1),
+                            static_cast<Eigen::Index>(data.Plane()));
+}
+
+void StartingMaps::Add(const SliceBlock& block) {
+  State& s = *state_;
+  if (s.basis.cols() == 0) {
+    return;
   }
-  ++job.passes;
-  ExtendMaps(data.width, data.height, data.margin, maps);
-  return maps;
+  ParallelFor(block.count, s.thread_count, [&](std::int64_t row) {
+    Eigen::VectorXd slice(s.header.SliceSize());
+    const std::int64_t at = row * s.header.SliceSize();
+    s.rows.Make(block.rd + at, block.valid + at, slice.data());
+    const std::int64_t point = block.first + row;
+    const std::int64_t to = (point / s.header.points_x + s.data.margin) * s.data.width +
+                            point % s.header.points_x + s.data.margin;
+    s.maps.col(to) = (s.basis.transpose() * (slice - s.mean.transpose())).cast<float>();
+  });
+}
+
+SharedMaps StartingMaps::Finish() {
+  const ReciprocalData& data = state_->data;
+  ExtendMaps(data.width, data.height, data.margin, state_->maps);
+  return std::move(state_->maps);
 }
 
 }  // namespace nacre::factor::internal

@@ -20,7 +20,25 @@ struct Interval {
   double high = 1e300;
 };
 
+Interval Around(double total, double bound) {
+  return {total * (1 - bound), total * (1 + bound)};
+}
+
+// All cells being measured, the totals are what they should be.
+std::vector<Interval> KnownWanted(const Job& job, double bound) {
+  std::vector<Interval> wanted(job.totals.size());
+  for (std::size_t n = 0; n < wanted.size(); ++n) {
+    if (job.totals[n] > 0) {
+      wanted[n] = Around(job.totals[n], bound);
+    }
+  }
+  return wanted;
+}
+
 std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
+  if (!job.totals.empty()) {
+    return KnownWanted(job, bound);
+  }
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const std::int64_t points = m.PointCount();
   const auto channels = static_cast<int>(m.channels.size());
@@ -52,10 +70,9 @@ std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
           }
         }
         if (measured > 0 && modelled > 0) {
-          const double total = measured * whole / modelled;
           wanted[c * static_cast<std::size_t>(points) +
-                 static_cast<std::size_t>(point)] = {total * (1 - bound),
-                                                     total * (1 + bound)};
+                 static_cast<std::size_t>(point)] =
+              Around(measured * whole / modelled, bound);
         }
       }
     });
@@ -86,8 +103,33 @@ void Spread(const Material& m, std::int64_t point, std::vector<std::uint8_t>& ma
   }
 }
 
-void BalanceChannel(
-    const Job& job, int channel, const Interval* wanted, float step, Material& m) {
+// Of all slices: [channel][point].
+std::vector<double> Totals(const Material& m, int thread_count) {
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  const auto window = static_cast<std::size_t>(m.WindowSize());
+  std::vector<double> totals(m.channels.size() * points);
+  ParallelFor(m.PointCount(), thread_count, [&](std::int64_t p) {
+    std::vector<float> values(window * m.channels.size());
+    ScaledReciprocalWindows(
+        m,
+        {static_cast<int>(p % m.points_x), static_cast<int>(p / m.points_x)},
+        values.data());
+    for (std::size_t c = 0; c < m.channels.size(); ++c) {
+      const float* first = &values[c * window];
+      totals[c * points + static_cast<std::size_t>(p)] =
+          std::accumulate(first, first + window, 0.0);
+    }
+  });
+  return totals;
+}
+
+// `totals` are those to begin with.
+void BalanceChannel(const Job& job,
+                    int channel,
+                    const double* totals,
+                    const Interval* wanted,
+                    float step,
+                    Material& m) {
   const auto points = static_cast<std::size_t>(m.PointCount());
   float* scale = &m.row_scale[static_cast<std::size_t>(channel) * points];
   std::vector<std::uint8_t> marked(points, 1);
@@ -98,7 +140,7 @@ void BalanceChannel(
       if (marked[n] == 0) {
         return;
       }
-      const double total = TotalOf(m, channel, p);
+      const double total = round == 0 ? totals[n] : TotalOf(m, channel, p);
       const double goal = std::clamp(total, wanted[n].low, wanted[n].high);
       if (goal != total) {
         const double factor = static_cast<double>(scale[n]) * std::sqrt(goal / total);
@@ -133,9 +175,10 @@ void BalanceTotals(Job& job, double bound, Material& m) {
   }
   const std::vector<Interval> wanted =
       Wanted(job, std::max(bound - static_cast<double>(step), 0.0), m);
+  const std::vector<double> totals = Totals(m, job.options.thread_count);
   for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
-    BalanceChannel(
-        job, c, &wanted[static_cast<std::size_t>(c * m.PointCount())], step, m);
+    const auto first = static_cast<std::size_t>(c * m.PointCount());
+    BalanceChannel(job, c, &totals[first], &wanted[first], step, m);
   }
 }
 

@@ -9,7 +9,8 @@ namespace nacre::factor::internal {
 /// it are moved to it, the others stay as they are as far as their neighbours let them.
 /// One factor a point, applied at both ends, keeps reciprocity; it is found as a fixed
 /// point and rounded to steps of a quarter of the bound at most, which the material's
-/// own becomes if it has steps. Slices without a positive total stay. One pass.
+/// own becomes if it has steps. Slices without a positive total stay. One pass, or
+/// none where the job knows the measured totals.
 void BalanceTotals(Job& job, double bound, Material& material);
 
 }  // namespace nacre::factor::internal

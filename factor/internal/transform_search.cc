@@ -14,6 +14,8 @@ namespace {
 
 constexpr double kLogLimit = 4.605170185988091;  // ln 100: c up to 100 peaks
 constexpr double kSlack = 0.05;
+constexpr int kFewRows = 64;
+constexpr int kRowsATerm = 8;
 constexpr double kSmallestOffset = 1e-4;  // of the peak: below, noise is amplified
 
 // One dimension of the search, keeping the best point seen.
@@ -124,9 +126,26 @@ double TransformObjective(const RowMatrix& rd,
          (search.log_weight > 0 ? search.log_weight * error.LogRms() : 0);
 }
 
+namespace {
+
+// Every n-th row, about `wanted` of them.
+RowMatrix Thin(const RowMatrix& rd, Eigen::Index wanted) {
+  const Eigen::Index step = std::max<Eigen::Index>(1, rd.rows() / wanted);
+  RowMatrix few((rd.rows() + step - 1) / step, rd.cols());
+  for (Eigen::Index row = 0; row < few.rows(); ++row) {
+    few.row(row) = rd.row(row * step);
+  }
+  return few;
+}
+
+}  // namespace
+
+// The valley is found on a few rows, as the cost grows with their square; how far its
+// floor reaches, on all.
 TransformChoice ChooseTransform(const RowMatrix& rd, const TransformSearch& search) {
+  const RowMatrix few = Thin(rd, std::max(kFewRows, kRowsATerm * search.terms));
   Minimum minimum([&](double log_c, double log_b) {
-    return TransformObjective(rd, TransformOf(log_c, log_b, search.peak), search);
+    return TransformObjective(few, TransformOf(log_c, log_b, search.peak), search);
   });
   const double lowest =
       std::min(kLogLimit,
@@ -154,10 +173,14 @@ TransformChoice ChooseTransform(const RowMatrix& rd, const TransformSearch& sear
       break;
     }
   }
-  const double log_c = SmallestWithinSlack(minimum, lowest);
+  Minimum floor([&](double log_c, double log_b) {
+    return TransformObjective(rd, TransformOf(log_c, log_b, search.peak), search);
+  });
+  floor.Try(minimum.log_c(), minimum.log_b());
+  const double log_c = SmallestWithinSlack(floor, lowest);
   return {TransformOf(log_c, minimum.log_b(), search.peak),
-          minimum.best(),
-          minimum.evaluations()};
+          floor.best(),
+          minimum.evaluations() + floor.evaluations()};
 }
 
 }  // namespace nacre::factor::internal

@@ -281,6 +281,46 @@ TEST(Factor, AutoTakesWhatIsBestAndSaysSo) {
   EXPECT_THAT(best.summary.notes.back(), HasSubstr(best.material.method));
 }
 
+// A dataset of one channel, three times over.
+RdDataset MakeGrey(const RdDataset& one) {
+  RdDataset grey = one;
+  grey.header.channels = {"R", "G", "B"};
+  grey.rd.clear();
+  const std::int64_t window = one.header.WindowSize();
+  for (auto slice = one.rd.begin(); slice != one.rd.end(); slice += window) {
+    for (int c = 0; c < 3; ++c) {
+      grey.rd.insert(grey.rd.end(), slice, slice + window);
+    }
+  }
+  grey.valid.assign(grey.rd.size(), 1);
+  return grey;
+}
+
+TEST(Factor, EqualChannelsAreFactoredAndStoredOnce) {
+  RdDataset one =
+      MakeChessboard({.points_x = 12, .points_y = 12, .core = 5, .channels = 1});
+  one.sigma.clear();
+  RdDataset grey = MakeGrey(one);
+  const nacre::testing::TempFolder folder;
+  for (const char* method : {"log-svd", "profiles", "bilinear", "reciprocal"}) {
+    SCOPED_TRACE(method);
+    const FactorOptions options{.method = method, .terms = 2};
+    const auto [m, summary] = Factor(grey, options);
+    const Factorization single = Factor(one, options);
+    EXPECT_TRUE(m.is_grey);
+    EXPECT_EQ(m.f, single.material.f);
+    EXPECT_EQ(m.h, single.material.h);
+    EXPECT_EQ(summary.dataset_bytes, 3 * single.summary.dataset_bytes);
+    WriteMaterial(folder.path() / "m.nacre.exr", m);
+    const Material read = ReadMaterial(folder.path() / "m.nacre.exr");
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_EQ(read.Evaluate(c, 3, 4, 1, 2), single.material.Evaluate(0, 3, 4, 1, 2));
+    }
+  }
+  grey.rd[80] *= 1.001F;
+  EXPECT_FALSE(Factor(grey, {.method = "svd"}).material.is_grey);
+}
+
 TEST(Factor, StopsWhenAsked) {
   const RdDataset dataset = MakeChessboard({.points_x = 12, .points_y = 12, .core = 5});
   try {
