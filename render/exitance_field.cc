@@ -25,6 +25,8 @@ std::int64_t NodeSlot(int i, int j, int n) {
 
 // For what is blurred, points of the grid that many apart will do.
 constexpr int kCoarse = 4;
+// And of vertices, one within so many patches.
+constexpr float kBlurredPatches = 8;
 
 // A cell of a lattice, and the side to which a normal mostly points. No object reaches
 // over the 2²⁰ cells after which numbers repeat: GatherPatches sees to that.
@@ -83,11 +85,11 @@ std::vector<SurfacePoint> VertexPoints(const Shape& shape, float mm_per_unit) {
 ExitanceField::ExitanceField(const Shape& shape,
                              std::unique_ptr<const Subsurface> subsurface,
                              float spacing_mm,
-                             float blurred_mm)
+                             float patch_mm)
     : shape_(shape),
       subsurface_(std::move(subsurface)),
       mm_per_unit_(shape.translucency->mm_per_unit),
-      blurred_mm_(blurred_mm) {
+      patch_mm_(patch_mm) {
   if (!(spacing_mm > 0)) {
     return;
   }
@@ -104,7 +106,9 @@ void ExitanceField::PlanMesh(const TriangleMesh& mesh, float spacing) {
   divisions_.reserve(mesh.triangles.size());
   first_slot_.reserve(mesh.triangles.size());
   for (const auto& triangle : mesh.triangles) {
-    const float wanted = std::ceil(LongestSide(mesh, triangle) / spacing);
+    const float longest = LongestSide(mesh, triangle);
+    const float wanted =
+        longest * mm_per_unit_ <= patch_mm_ ? 1 : std::ceil(longest / spacing);
     if (!(wanted < 30000)) {
       return;
     }
@@ -130,7 +134,7 @@ void ExitanceField::ChooseForBlurred() {
       return cell != b.cell ? cell < b.cell : vertex < b.vertex;
     }
   };
-  const float per_mm = 1 / blurred_mm_;
+  const float per_mm = 1 / (kBlurredPatches * patch_mm_);
   std::vector<Member> members;
   members.reserve(vertices_.size());
   for (std::size_t i = 0; i < vertices_.size(); ++i) {

@@ -18,13 +18,14 @@ namespace nacre::render {
 /// grid a triangle; on a sphere it is longitude and latitude.
 class ExitanceField final : public ExitanceSource {
  public:
-  /// `spacing_mm`: at most this far apart; 0 asks the model at every hit. Of vertices
-  /// within a cell `blurred_mm` wide, one stands for all in what is blurred. The
-  /// references must outlive it.
+  /// `spacing_mm`: at most this far apart, but for triangles no longer than a patch of
+  /// the model, whose vertices will do; 0 asks the model at every hit. Of vertices
+  /// within a few patches one stands for all in what is blurred. The references must
+  /// outlive it.
   ExitanceField(const Shape& shape,
                 std::unique_ptr<const Subsurface> subsurface,
                 float spacing_mm,
-                float blurred_mm);
+                float patch_mm);
 
   /// At a hit of the shape. What is dim may be a grid's spacing off; what is blurred
   /// may come from anywhere within a few of them, so that there is less to ask.
@@ -63,7 +64,7 @@ class ExitanceField final : public ExitanceSource {
   const Shape& shape_;
   std::unique_ptr<const Subsurface> subsurface_;
   float mm_per_unit_;
-  float blurred_mm_;
+  float patch_mm_;
   std::int64_t grid_size_ = 0;
   std::unique_ptr<Value[]> values_;
   // Meshes: divisions of a triangle's sides and its first slot (if more than 1).

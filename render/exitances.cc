@@ -42,9 +42,6 @@ void TraceSeeingPaths(const World& world,
       });
 }
 
-// What is blurred may come from anywhere within so many patches.
-constexpr float kBlurredPatches = 8;
-
 }  // namespace
 
 Exitances::Exitances(const World& world,
@@ -130,7 +127,7 @@ void Exitances::Illuminate(std::uint32_t shape,
       lit_shape,
       model.Illuminate(std::move(points.points), options.thread_count),
       static_cast<float>(options.exitance_spacing) * model.ExitanceSpacingMm(),
-      kBlurredPatches * model.PatchSizeMm());
+      model.PatchSizeMm());
   summary.models_s += model_time.Seconds();
 }
 
