@@ -382,8 +382,8 @@ TEST(ExitanceFieldTest, InterpolatesWithinItsSpacingOnEveryShape) {
     Scene scene = WithLocalModel(SceneText("<shape type=\"" + type + "\"/>"), 1);
     scene.shapes[0].translucency->mm_per_unit = 10;
     const Shape& shape = scene.shapes[0];
-    const ExitanceField coarse(shape, std::make_unique<WaveSubsurface>(), 0.25F);
-    const ExitanceField exact(shape, std::make_unique<WaveSubsurface>(), 0);
+    const ExitanceField coarse(shape, std::make_unique<WaveSubsurface>(), 0.25F, 1);
+    const ExitanceField exact(shape, std::make_unique<WaveSubsurface>(), 0, 0);
     EXPECT_GT(coarse.grid_size(), 1000);
     EXPECT_EQ(exact.grid_size(), 0);
     const AreaSampler area(shape);
@@ -405,7 +405,7 @@ TEST(ExitanceFieldTest, InterpolatesWithinItsSpacingOnEveryShape) {
 TEST(ExitanceFieldTest, AsksTheModelOnceAPoint) {
   const Scene scene = WithLocalModel(SceneText(R"(<shape type="rectangle"/>)"), 1);
   const Shape& shape = scene.shapes[0];
-  const ExitanceField field(shape, std::make_unique<WaveSubsurface>(), 0.5F);
+  const ExitanceField field(shape, std::make_unique<WaveSubsurface>(), 0.5F, 2);
   const SurfaceHit hit = MeshPoint(shape, 0, {0.31F, 0.22F});
   PathCounters asked;
   const Color first = field.At(hit, asked);
