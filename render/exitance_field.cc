@@ -108,7 +108,7 @@ void ExitanceField::PlanMesh(const TriangleMesh& mesh, float spacing) {
   for (const auto& triangle : mesh.triangles) {
     const float longest = LongestSide(mesh, triangle);
     const float wanted =
-        longest * mm_per_unit_ <= patch_mm_ ? 1 : std::ceil(longest / spacing);
+        longest * mm_per_unit_ <= 2 * patch_mm_ ? 1 : std::ceil(longest / spacing);
     if (!(wanted < 30000)) {
       return;
     }

@@ -18,8 +18,8 @@ namespace nacre::render {
 /// grid a triangle; on a sphere it is longitude and latitude.
 class ExitanceField final : public ExitanceSource {
  public:
-  /// `spacing_mm`: at most this far apart, but for triangles no longer than a patch of
-  /// the model, whose vertices will do; 0 asks the model at every hit. Of vertices
+  /// `spacing_mm`: at most this far apart, but for triangles no longer than two patches
+  /// of the model, whose vertices will do; 0 asks the model at every hit. Of vertices
   /// within a few patches one stands for all in what is blurred. The references must
   /// outlive it.
   ExitanceField(const Shape& shape,
