@@ -13,7 +13,7 @@ namespace nacre::cli::web {
 namespace {
 
 constexpr const char* kAddress = "127.0.0.1";
-constexpr std::size_t kThreads = 2;
+constexpr std::size_t kThreads = 8;  // a browser asks by six connections at once
 
 std::string RandomToken() {
   unsigned char bytes[16];
@@ -78,6 +78,9 @@ LocalServer::LocalServer(int port,
     : parts_(std::make_unique<Parts>()) {
   httplib::Server& http = parts_->http;
   http.new_task_queue = [] { return new httplib::ThreadPool(kThreads); };
+  // A connection that is kept open holds a thread, and is closed under the browser's
+  // next question when its time is over.
+  http.set_keep_alive_max_count(1);
   // httplib would share the port with others (SO_REUSEPORT).
   http.set_socket_options([](socket_t) {});
   http.set_default_headers(
