@@ -1,5 +1,7 @@
 #include "render/seen_places.h"
 
+#include "render/bounds.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -8,28 +10,6 @@ namespace {
 
 // Farther than any cell, and small enough that squares of cells beside it stay exact.
 constexpr float kFar = 1e6F;
-
-struct Box {
-  Vec3 low;
-  Vec3 high;
-};
-
-Box BoundsOf(const Shape& shape) {
-  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
-    const Vec3 r{sphere->radius, sphere->radius, sphere->radius};
-    return {sphere->center - r, sphere->center + r};
-  }
-  const auto& positions = std::get<TriangleMesh>(shape.geometry).positions;
-  Box box{positions.front(), positions.front()};
-  for (const Vec3 p : positions) {
-    box.low = {
-        std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x),
-                std::max(box.high.y, p.y),
-                std::max(box.high.z, p.z)};
-  }
-  return box;
-}
 
 // One line of the distance transform of sampled functions [Felzenszwalb & Huttenlocher
 // 12]: d(p) = min_q (p − q)² + f(q), the lower envelope of parabolas.

@@ -2,6 +2,7 @@
 
 #include "render/scene_reader/mapping.h"
 
+#include "render/bounds.h"
 #include "render/scene_reader/objects.h"
 
 #include <algorithm>
@@ -9,28 +10,6 @@
 
 namespace nacre::render {
 namespace {
-
-struct Box {
-  Vec3 low;
-  Vec3 high;
-};
-
-Box Bounds(const Shape& shape) {
-  if (const auto* sphere = std::get_if<Sphere>(&shape.geometry)) {
-    const Vec3 r{sphere->radius, sphere->radius, sphere->radius};
-    return {sphere->center - r, sphere->center + r};
-  }
-  const auto& positions = std::get<TriangleMesh>(shape.geometry).positions;
-  Box box{positions.front(), positions.front()};
-  for (const Vec3 p : positions) {
-    box.low = {
-        std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x),
-                std::max(box.high.y, p.y),
-                std::max(box.high.z, p.z)};
-  }
-  return box;
-}
 
 bool HasUv(const Shape& shape) {
   const auto* mesh = std::get_if<TriangleMesh>(&shape.geometry);
@@ -114,7 +93,7 @@ void NoteScale(Element& element,
                Mapping mapping) {
   Document& document = element.document();
   const auto mm = static_cast<double>(translucency.mm_per_unit);
-  const Box box = Bounds(shape);
+  const Box box = BoundsOf(shape);
   const double object_mm = mm * static_cast<double>(Length(box.high - box.low));
   const auto core_mm = static_cast<double>(translucency.core_mm);
   if (core_mm > object_mm) {
@@ -152,7 +131,7 @@ void NoteSmallCores(Document& document) {
     if (!shape.translucency || !(shape.translucency->core_mm > 0)) {
       continue;
     }
-    const Box box = Bounds(shape);
+    const Box box = BoundsOf(shape);
     const Vec3 nearest{std::clamp(eye.x, box.low.x, box.high.x),
                        std::clamp(eye.y, box.low.y, box.high.y),
                        std::clamp(eye.z, box.low.z, box.high.z)};
