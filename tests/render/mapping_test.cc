@@ -150,15 +150,19 @@ TEST(MappingTest, StretchOfTheParameterisationDoesNotShow) {
   EXPECT_LT(Compare(stretched, stretched, world, world).total, 0.01);
 }
 
+Scene TurnedCube(Mapping mapping) {
+  return Lit(
+      "<shape type=\"cube\"><transform name=\"toWorld\"><rotate y=\"1\" "
+      "angle=\"30\"/></transform>",
+      Sample(0.3),
+      mapping,
+      "2, 3, 5");
+}
+
 TEST(MappingTest, FastIsReferenceForEachMapping) {
   for (const Mapping mapping :
        {Mapping::kTexture, Mapping::kWorld, Mapping::kTriplanar}) {
-    Scene scene =
-        Lit("<shape type=\"cube\"><transform name=\"toWorld\"><rotate y=\"1\" "
-            "angle=\"30\"/></transform>",
-            Sample(0.3),
-            mapping,
-            "2, 3, 5");
+    Scene scene = TurnedCube(mapping);
     if (mapping == Mapping::kTexture) {
       scene.shapes[0].geometry = Slab(16, Stretched);
     }
@@ -180,12 +184,7 @@ TEST(MappingTest, FastIsReferenceForEachMapping) {
 
 TEST(MappingTest, ProjectionsDoNotShowTheTriangles) {
   for (const Mapping mapping : {Mapping::kBox, Mapping::kTriplanar}) {
-    Scene scene =
-        Lit("<shape type=\"cube\"><transform name=\"toWorld\"><rotate y=\"1\" "
-            "angle=\"30\"/></transform>",
-            Sample(0.3),
-            mapping,
-            "2, 3, 5");
+    Scene scene = TurnedCube(mapping);
     auto& mesh = std::get<TriangleMesh>(scene.shapes[0].geometry);
     mesh.uvs.clear();
     const ExrPart coarse = Picture(scene);

@@ -21,19 +21,25 @@ namespace {
 using nacre::testing::ErrorMessage;
 using ::testing::HasSubstr;
 
+// Listens for one caller on a free port of this machine, which is put into `port`.
+int Listen(int& port) {
+  const int listener = socket(AF_INET, SOCK_STREAM, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof(address);
+  auto* const any = reinterpret_cast<sockaddr*>(&address);  // NOLINT
+  EXPECT_EQ(bind(listener, any, size), 0);
+  EXPECT_EQ(listen(listener, 1), 0);
+  EXPECT_EQ(getsockname(listener, any, &size), 0);
+  port = ntohs(address.sin_port);
+  return listener;
+}
+
 // Listens on a port of its own, and takes all that one client sends.
 class Viewer {
  public:
-  Viewer() : listener_(socket(AF_INET, SOCK_STREAM, 0)) {
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof(address);
-    auto* const any = reinterpret_cast<sockaddr*>(&address);  // NOLINT
-    EXPECT_EQ(bind(listener_, any, size), 0);
-    EXPECT_EQ(listen(listener_, 1), 0);
-    EXPECT_EQ(getsockname(listener_, any, &size), 0);
-    port_ = ntohs(address.sin_port);
+  Viewer() : listener_(Listen(port_)) {
     thread_ = std::jthread([this] { TakeAll(); });
   }
   ~Viewer() { close(listener_); }
@@ -55,8 +61,8 @@ class Viewer {
     close(client);
   }
 
+  int port_ = 0;  // before what sets it
   int listener_;
-  int port_ = 0;
   std::string bytes_;
   std::jthread thread_;
 };
@@ -168,16 +174,9 @@ TEST(TevTest, TheViewerShowsThePictureThatWasSent) {
 
 TEST(TevTest, AViewerThatGoesIsNoError) {
   const ExrPart image = Gradient(64, 64);
-  const int listener = socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  socklen_t size = sizeof(address);
-  auto* const any = reinterpret_cast<sockaddr*>(&address);  // NOLINT
-  ASSERT_EQ(bind(listener, any, size), 0);
-  ASSERT_EQ(listen(listener, 1), 0);
-  ASSERT_EQ(getsockname(listener, any, &size), 0);
-  TevDisplay display("127.0.0.1:" + std::to_string(ntohs(address.sin_port)));
+  int port = 0;
+  const int listener = Listen(port);
+  TevDisplay display("127.0.0.1:" + std::to_string(port));
   const int client = accept(listener, nullptr, nullptr);
   close(client);
   close(listener);
