@@ -1,5 +1,5 @@
 # cpack -G DEB: the command, what a rig needs, the presets, the add-on for Blender, and
-# libraries to build on, a package each.
+# libraries to build on, a package each; the Python module where it is built.
 set(CPACK_PACKAGE_NAME nacre)
 set(CPACK_PACKAGE_CONTACT "The Nacre project")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "Measured translucency: captured, factored, rendered")
@@ -30,6 +30,16 @@ set(CPACK_DEBIAN_BLENDER_PACKAGE_NAME nacre-blender)
 set(CPACK_DEBIAN_BLENDER_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_BLENDER_PACKAGE_DEPENDS "nacre, nacre-presets, blender, python3-numpy")
 set(CPACK_COMPONENT_BLENDER_DESCRIPTION "Nacre as a render engine in Blender")
+
+if(TARGET nacre_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-nacre)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+    "python3 (>= ${NACRE_PYTHON_VERSION}), python3 (<< ${NACRE_PYTHON_NEXT}), python3-numpy")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "Datasets, materials and pictures as NumPy arrays")
+endif()
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libnacre-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)

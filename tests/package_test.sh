@@ -25,6 +25,10 @@ for file in nacre-factor.1.gz completions/nacre addons/nacre/__init__.py rigs/gi
   nacre/nacreConfig.cmake; do
   find "$root" -path "*/$file" | grep -q . || { echo "no $file in the packages" >&2; exit 1; }
 done
+if [ -f "$scratch"/python3-nacre_*.deb ]; then
+  dpkg-deb --extract "$scratch"/python3-nacre_*.deb "$scratch/root"
+  PYTHONPATH=$root/lib/python3/dist-packages /usr/bin/python3 -c 'import nacre; nacre.Dataset'
+fi
 cat > "$scratch/scene.xml" << 'XML'
 <scene version="0.6.0"><integrator type="path"/>
 <sensor type="perspective"><transform name="toWorld"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
