@@ -26,6 +26,7 @@ struct Arguments {
   bool lenient = false;
   bool stats = false;
   bool reference = false;
+  bool adaptive = false;
   bool denoise = false;
   std::filesystem::path checkpoint;
   std::string tev;
@@ -50,6 +51,7 @@ void AddArguments(CLI::App& app, Arguments& arguments) {
   app.add_flag("--stats", arguments.stats, "print where time went and what was done");
   app.add_flag(
       "--reference", arguments.reference, "the same as --integrator reference");
+  app.add_flag("--adaptive", arguments.adaptive, "the same as --sampling adaptive");
   app.add_option("--checkpoint",
                  arguments.checkpoint,
                  "keep all samples in this file every ten seconds; if it is there "
@@ -99,7 +101,7 @@ std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments)
 // What a sample depends on: a picture may be gone on with to more of them.
 std::string IdentityOf(const std::string& provenance) {
   Json identity = ParseJson(provenance, "provenance");
-  for (const char* name : {"spp", "time_limit", "error_target", "adaptive"}) {
+  for (const char* name : {"spp", "time_limit", "error_target", "sampling"}) {
     identity["options"].erase(name);
   }
   return identity.dump();
@@ -150,6 +152,9 @@ int Run(Arguments& arguments, const Common& common) {
   render::RenderOptions& options = arguments.options;
   if (arguments.reference) {
     options.integrator = "reference";
+  }
+  if (arguments.adaptive) {
+    options.sampling = "adaptive";
   }
   options.seed = common.seed;
   options.thread_count = common.thread_count;

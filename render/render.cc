@@ -20,9 +20,10 @@ namespace {
 
 // Whether photons can bring what this scene's glass and mirrors throw.
 void CheckPhotons(const Scene& scene, const RenderOptions& options) {
-  if (options.adaptive) {
+  if (options.sampling == "adaptive") {
     throw UsageError(
-        "--adaptive doesn't go with sppm, of which each sample has photons of its own");
+        "--sampling adaptive doesn't go with sppm, of which each sample has photons of "
+        "its own");
   }
   for (const Shape& shape : scene.shapes) {
     if (shape.interior != nullptr || shape.exterior != nullptr) {
@@ -45,6 +46,24 @@ IntegratorSettings ChooseIntegrator(const Scene& scene, const std::string& name)
                      "': there are scene, path, direct, fast, sppm and reference");
   }
   return settings;
+}
+
+Sampling ChooseSampling(const IntegratorSettings& settings,
+                        const RenderOptions& options) {
+  if (options.sampling == "even") {
+    return Sampling::kEven;
+  }
+  if (options.sampling == "adaptive") {
+    return Sampling::kAdaptive;
+  }
+  if (options.sampling != "auto") {
+    throw UsageError("no sampling '" + options.sampling +
+                     "': there are auto, even and adaptive");
+  }
+  // Photons come a sample of all pixels at a time; what is a reference has no bias.
+  return settings.photons.enabled || options.integrator == "reference"
+             ? Sampling::kEven
+             : Sampling::kAsGoodAsEven;
 }
 
 // Traces the samples of one pass, tile by tile.
@@ -266,7 +285,7 @@ Rendering Render(const Scene& scene,
   const SamplePlan plan(scene.film,
                         {.spp = SamplesAtMost(scene, options),
                          .error_target = options.error_target,
-                         .adaptive = options.adaptive});
+                         .sampling = ChooseSampling(settings, options)});
   Pass pass(scene, tracer, options, plan, film);
   Schedule schedule(options, total.Seconds());
   const std::int64_t made_before = SamplesMade(film);

@@ -21,7 +21,7 @@ struct RenderOptions {
   int thread_count = 0;
   double time_limit_s = 0;
   double error_target = 0;
-  bool adaptive = false;
+  std::string sampling = "auto";
   bool aovs = false;
   double clamp = 0;
   double points_per_patch = 16;
@@ -49,11 +49,13 @@ struct RenderOptions {
           Range{0, 1e3},
           "relative L2 error at which to stop, estimated from the samples' variance; "
           "0: none. Without --spp up to 65536 samples a pixel are made");
-    visit("adaptive",
-          self.adaptive,
-          Range{},
-          "more samples where the picture is noisier: --spp on average, or as many as "
-          "--error-target takes");
+    visit(
+        "sampling",
+        self.sampling,
+        Range{},
+        "even: --spp samples in each pixel; adaptive: more where the picture is "
+        "noisier, --spp on average or as many as --error-target takes; auto: adaptive "
+        "until the error is that of --spp even samples (sppm and reference: even)");
     visit("aovs",
           self.aovs,
           Range{},

@@ -132,31 +132,43 @@ double SamplePlan::LevelForError(const std::vector<Tile>& tiles, double error2) 
   });
 }
 
+// Σ v / n at which to stop, over pixels; 0: never.
+double SamplePlan::SquaredErrorAllowed(const Accumulator& film,
+                                       const std::vector<Tile>& tiles) const {
+  double allowed = 0;
+  if (budget_.error_target > 0) {
+    for (std::size_t i = 0; i < film.PixelCount(); ++i) {
+      const double mean = film.LuminanceOf(i).mean;
+      allowed += mean * mean;
+    }
+    allowed *= budget_.error_target * budget_.error_target;
+  } else if (budget_.sampling == Sampling::kAsGoodAsEven) {
+    for (const Tile& tile : tiles) {
+      allowed += tile.variance / budget_.spp;
+    }
+  }
+  return allowed;
+}
+
 std::vector<int> SamplePlan::Next(const Accumulator& film) const {
   const std::vector<Tile> tiles = Survey(film);
   const auto by_done = [](const Tile& a, const Tile& b) { return a.done < b.done; };
   const int least = std::min_element(tiles.begin(), tiles.end(), by_done)->done;
-  const double target = budget_.error_target;
-  if (target > 0 && film.RelativeError() <= target) {
+  if (budget_.error_target > 0 && film.RelativeError() <= budget_.error_target) {
     return {};
   }
-  const bool adaptive = budget_.adaptive && least >= kEvenly;
-  if (!adaptive) {
+  if (budget_.sampling == Sampling::kEven || least < kEvenly) {
     return least < budget_.spp ? Uniform(least) : std::vector<int>();
   }
   const double last_level = LevelForSamples(tiles);
   double level = last_level;
-  if (target > 0) {
-    double squares = 0;
-    for (std::size_t i = 0; i < film.PixelCount(); ++i) {
-      const double mean = film.LuminanceOf(i).mean;
-      squares += mean * mean;
-    }
-    level = std::max(level, LevelForError(tiles, target * target * squares));
+  const double allowed = SquaredErrorAllowed(film, tiles);
+  if (allowed > 0) {
+    level = std::max(level, LevelForError(tiles, allowed));
   }
-  // Rounding may leave an error just above the target: then a little more.
+  // Rounding may leave an error just above what is allowed: then a little more.
   std::vector<int> next = Adapted(tiles, level);
-  while (next.empty() && level > last_level) {
+  while (budget_.error_target > 0 && next.empty() && level > last_level) {
     level = std::max(last_level, 0.7 * level);
     next = Adapted(tiles, level);
   }

@@ -6,10 +6,16 @@
 
 namespace nacre::render {
 
+enum class Sampling {
+  kEven,
+  kAdaptive,      ///< more samples where they help more
+  kAsGoodAsEven,  ///< the same, until the error is what even samples would have
+};
+
 struct SampleBudget {
-  int spp = 64;             ///< samples a pixel: of each, or on average if adaptive
+  int spp = 64;             ///< samples a pixel: of each, or on average at most
   double error_target = 0;  ///< relative L2 error at which to stop; 0: none
-  bool adaptive = false;    ///< more samples where they help more
+  Sampling sampling = Sampling::kEven;
 };
 
 /// How many samples each tile of the picture gets, pass by pass. The picture's error is
@@ -50,6 +56,8 @@ class SamplePlan {
   std::vector<int> Adapted(const std::vector<Tile>& tiles, double level) const;
   double LevelForSamples(const std::vector<Tile>& tiles) const;
   double LevelForError(const std::vector<Tile>& tiles, double error2) const;
+  double SquaredErrorAllowed(const Accumulator& film,
+                             const std::vector<Tile>& tiles) const;
 
   Film film_;
   SampleBudget budget_;

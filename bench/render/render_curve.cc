@@ -2,7 +2,7 @@
 //
 //   render_curve SCENE.xml [--truth T.exr] [--truth-spp N] [--integrator NAME] [--spp
 //   A,B,…]
-//                [--threads N] [--adaptive] [-D name=value …]
+//                [--threads N] [--sampling auto] [-D name=value …]
 //
 // Each line is a picture of its own: samples, CPU-seconds all in (the scene's reading
 // not), the part of them before the first path, and the relative L2 error against the
@@ -29,7 +29,7 @@ struct Arguments {
   std::string integrator = "fast";
   int truth_spp = 4096;
   int thread_count = 1;
-  bool adaptive = false;
+  std::string sampling = "even";
   std::vector<int> spp{1, 2, 4, 8, 16, 32, 64};
   std::vector<std::string> defines;
 };
@@ -88,7 +88,7 @@ void Run(const Arguments& arguments) {
     options.thread_count = arguments.thread_count;
   }
   options.integrator = arguments.integrator;
-  options.adaptive = arguments.adaptive;
+  options.sampling = arguments.sampling;
   std::vector<Row> rows;
   std::printf(
       "| spp | CPU-s | before paths | relative L2 | lit points | questions | pairs "
@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
   app.add_option("--integrator", arguments.integrator);
   app.add_option("--spp", arguments.spp)->delimiter(',');
   app.add_option("--threads", arguments.thread_count);
-  app.add_flag("--adaptive", arguments.adaptive);
+  app.add_option("--sampling", arguments.sampling);
   app.add_option("-D", arguments.defines)->allow_extra_args(false);
   return nacre::render::RunTool(
       app, argc, argv, [&] { nacre::render::Run(arguments); });

@@ -102,7 +102,7 @@ TEST(CausticsTest, TheSceneMayAskForThem) {
               HasSubstr("alpha"));
   EXPECT_THAT(ReaderError(text(R"(<float name="photonCnt" value="2"/>)")),
               HasSubstr("did you mean 'photonCount'?"));
-  EXPECT_THROW(Render(scene, {.spp = 4, .adaptive = true}), Error);
+  EXPECT_THROW(Render(scene, {.spp = 4, .sampling = "adaptive"}), Error);
 }
 
 }  // namespace

@@ -31,6 +31,7 @@ RenderOptions Spp(int spp) {
   RenderOptions options;
   options.spp = spp;
   options.thread_count = 1;
+  options.sampling = "even";
   return options;
 }
 
@@ -56,7 +57,7 @@ TEST(SamplePlanTest, PassesAreEvenUnlessAdaptive) {
 // Two tiles, one of them with nine times the variance: three times the samples.
 TEST(SamplePlanTest, SamplesGoWithTheSpread) {
   const Film film{.width = 64, .height = 8, .crop_width = 64, .crop_height = 8};
-  const SamplePlan plan(film, {.spp = 64, .adaptive = true});
+  const SamplePlan plan(film, {.spp = 64, .sampling = Sampling::kAdaptive});
   Accumulator sums(film);
   for (auto next = plan.Next(sums); !next.empty(); next = plan.Next(sums)) {
     for (std::size_t pixel = 0; pixel < sums.PixelCount(); ++pixel) {
@@ -76,7 +77,7 @@ TEST(SamplingTest, AdaptiveSamplesLowerTheErrorForTheSameNumber) {
   const Scene scene = HalfNoisy();
   const Rendering even = Render(scene, Spp(64));
   RenderOptions options = Spp(64);
-  options.adaptive = true;
+  options.sampling = "adaptive";
   options.aovs = true;
   const Rendering adaptive = Render(scene, options);
   EXPECT_EQ(even.summary.samples_least, 64);
@@ -94,12 +95,31 @@ TEST(SamplingTest, AdaptiveSamplesLowerTheErrorForTheSameNumber) {
   EXPECT_LT(std::abs(difference) / sum, 0.005);  // no bias that would show
 }
 
+TEST(SamplingTest, ByDefaultSamplesEndWhenTheErrorIsThatOfEvenOnes) {
+  const Scene scene = HalfNoisy();
+  const Rendering even = Render(scene, Spp(64));
+  RenderOptions options = Spp(64);
+  options.sampling = RenderOptions().sampling;
+  const Rendering by_default = Render(scene, options);
+  EXPECT_LT(by_default.summary.samples_per_pixel, 0.75 * 64);
+  EXPECT_LT(by_default.summary.relative_error, 1.02 * even.summary.relative_error);
+  EXPECT_GT(by_default.summary.relative_error, 0.85 * even.summary.relative_error);
+  // Where there is too little to plan with, and where there must be no bias.
+  options.spp = 8;
+  EXPECT_EQ(Render(scene, options).image.values, Render(scene, Spp(8)).image.values);
+  options.spp = 20;
+  options.integrator = "reference";
+  EXPECT_EQ(Render(scene, options).summary.samples_least, 20);
+  options.sampling = "odd";
+  EXPECT_THROW(Render(scene, options), Error);
+}
+
 TEST(SamplingTest, AnErrorTargetIsReachedWithFewerSamples) {
   const Scene scene = HalfNoisy();
   RenderOptions options = Spp(0);
   options.error_target = 0.03;
   const Rendering even = Render(scene, options);
-  options.adaptive = true;
+  options.sampling = "adaptive";
   const Rendering adaptive = Render(scene, options);
   EXPECT_LE(adaptive.summary.relative_error, 0.03);
   EXPECT_GT(adaptive.summary.relative_error, 0.024);
@@ -132,9 +152,9 @@ TEST(CheckpointTest, WorkInTwoPartsGivesTheSameBits) {
   const nacre::testing::TempFolder folder;
   const Checkpoint checkpoint{folder.path() / "half", "scene a"};
   const Scene scene = HalfNoisy();
-  for (const bool adaptive : {false, true}) {
+  for (const char* sampling : {"even", "adaptive", "auto"}) {
     RenderOptions whole = Spp(40);
-    whole.adaptive = adaptive;
+    whole.sampling = sampling;
     const Rendering once = Render(scene, whole);
     std::filesystem::remove(checkpoint.path);
     Render(scene, Spp(16), {}, {}, checkpoint);
