@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/exr_reader.h"
 
 #include <OpenEXR/ImfChannelList.h>
 #include <OpenEXR/ImfFrameBuffer.h>
@@ -33,12 +34,23 @@ Imf::PixelType TypeOf(ExrPixels pixels) {
   return Imf::FLOAT;
 }
 
+Imf::Compression CompressionOf(ExrPixels pixels) {
+  switch (pixels) {
+    case ExrPixels::kHalf:
+      return Imf::PIZ_COMPRESSION;
+    case ExrPixels::kCodes:
+      return Imf::PXR24_COMPRESSION;  // lossless for UINT: differences, bytes apart
+    case ExrPixels::kFloat:
+      break;
+  }
+  return Imf::ZIP_COMPRESSION;
+}
+
 // All parts of a file share one display window, so that of the first serves for all.
 Imf::Header HeaderOf(const ExrPart& part, const ExrPart& first) {
   Imf::Header header(first.width, first.height);
   header.dataWindow() = Imath::Box2i({0, 0}, {part.width - 1, part.height - 1});
-  header.compression() =
-      part.pixels == ExrPixels::kFloat ? Imf::ZIP_COMPRESSION : Imf::PIZ_COMPRESSION;
+  header.compression() = CompressionOf(part.pixels);
   header.setType(Imf::SCANLINEIMAGE);
   if (!part.name.empty()) {
     header.setName(part.name);
@@ -115,22 +127,37 @@ void WriteParts(Imf::MultiPartOutputFile& file, const std::vector<ExrPart>& part
   }
 }
 
-// Counts what is written to it, and keeps nothing.
-class CountingStream : public Imf::OStream {
+// A file in memory: what OpenEXR writes to a disk when it closes a file, and that it
+// couldn't, it tells nobody.
+class MemoryStream : public Imf::OStream {
  public:
-  CountingStream() : Imf::OStream("memory") {}
-  void write(const char[], int n) override {
-    position_ += static_cast<std::uint64_t>(n);
-    size_ = std::max(size_, position_);
+  MemoryStream() : Imf::OStream("memory") {}
+  void write(const char bytes[], int n) override {
+    const auto count = static_cast<std::size_t>(n);
+    bytes_.resize(std::max(bytes_.size(), position_ + count));
+    std::copy(
+        bytes, bytes + n, bytes_.begin() + static_cast<std::ptrdiff_t>(position_));
+    position_ += count;
   }
   std::uint64_t tellp() override { return position_; }
   void seekp(std::uint64_t position) override { position_ = position; }
-  std::uint64_t size() const { return size_; }
+  std::string Take() && { return std::move(bytes_); }
 
  private:
-  std::uint64_t position_ = 0;
-  std::uint64_t size_ = 0;
+  std::size_t position_ = 0;
+  std::string bytes_;
 };
+
+std::string Encode(const std::vector<ExrPart>& parts) {
+  const std::vector<Imf::Header> headers = HeadersOf(parts);
+  MemoryStream stream;
+  {
+    Imf::MultiPartOutputFile output(
+        stream, headers.data(), static_cast<int>(headers.size()));
+    WriteParts(output, parts);
+  }
+  return std::move(stream).Take();
+}
 
 // Alphabetical, but R, G, B (and X, Y, Z as they are) in the order people think of
 // them.
@@ -148,8 +175,8 @@ std::vector<std::string> ChannelNames(const Imf::Header& header) {
   return names;
 }
 
-ExrPart ReadPart(Imf::MultiPartInputFile& file, int index, std::size_t& bytes_left) {
-  const Imf::Header& header = file.header(index);
+// The part without its values.
+ExrPart ReadHeader(const Imf::Header& header, std::size_t& bytes_left) {
   const Imath::Box2i window = header.dataWindow();
   ExrPart part;
   part.name = header.hasName() ? header.name() : std::string();
@@ -171,12 +198,11 @@ ExrPart ReadPart(Imf::MultiPartInputFile& file, int index, std::size_t& bytes_le
         part.channels.size()));
   }
   bytes_left -= static_cast<std::size_t>(bytes);
-  part.values.resize(part.PixelCount() * part.channels.size());
-  Imf::InputPart input(file, index);
-  input.setFrameBuffer(
-      BufferOf(part, Imf::FLOAT, part.values.data(), window.min.x, window.min.y));
-  input.readPixels(window.min.y, window.max.y);
   return part;
+}
+
+Error NotReadable(const std::filesystem::path& path, const std::exception& e) {
+  return BadData(path.string() + ": not a readable OpenEXR file: " + e.what());
 }
 
 }  // namespace
@@ -187,47 +213,63 @@ int ExrPart::FindChannel(const std::string& channel) const {
 }
 
 void WriteExr(const std::filesystem::path& path, const std::vector<ExrPart>& parts) {
-  const std::vector<Imf::Header> headers = HeadersOf(parts);
-  AtomicFile file(path);
+  std::string bytes;
   try {
-    Imf::MultiPartOutputFile output(file.temporary_path().c_str(),
-                                    headers.data(),
-                                    static_cast<int>(headers.size()));
-    WriteParts(output, parts);
-  } catch (const Error&) {
-    throw;
+    bytes = Encode(parts);
   } catch (const std::exception& e) {
     throw Error("cannot write " + path.string() + ": " + e.what());
   }
-  file.Commit();
+  WriteFile(path, bytes);
 }
 
 std::int64_t ExrFileBytes(const std::vector<ExrPart>& parts) {
-  const std::vector<Imf::Header> headers = HeadersOf(parts);
-  CountingStream stream;
-  {
-    Imf::MultiPartOutputFile output(
-        stream, headers.data(), static_cast<int>(headers.size()));
-    WriteParts(output, parts);
+  return static_cast<std::int64_t>(Encode(parts).size());
+}
+
+struct ExrReader::File {
+  explicit File(const std::filesystem::path& path) : file(path.c_str()) {}
+  Imf::MultiPartInputFile file;
+};
+
+ExrReader::ExrReader(std::filesystem::path path, std::size_t max_bytes)
+    : path_(std::move(path)) {
+  if (!std::filesystem::exists(path_)) {
+    throw Error("cannot read " + path_.string() + ": there is no such file");
   }
-  return static_cast<std::int64_t>(stream.size());
+  try {
+    file_ = std::make_unique<File>(path_);
+    for (int i = 0; i < file_->file.parts(); ++i) {
+      parts_.push_back(ReadHeader(file_->file.header(i), max_bytes));
+    }
+  } catch (const std::exception& e) {
+    throw NotReadable(path_, e);
+  }
+}
+
+ExrReader::~ExrReader() = default;
+
+ExrPart ExrReader::Read(std::size_t index) {
+  ExrPart part = parts_[index];
+  part.values.resize(part.PixelCount() * part.channels.size());
+  try {
+    Imf::InputPart input(file_->file, static_cast<int>(index));
+    const Imath::Box2i window = input.header().dataWindow();
+    input.setFrameBuffer(
+        BufferOf(part, Imf::FLOAT, part.values.data(), window.min.x, window.min.y));
+    input.readPixels(window.min.y, window.max.y);
+  } catch (const std::exception& e) {
+    throw NotReadable(path_, e);
+  }
+  return part;
 }
 
 std::vector<ExrPart> ReadExr(const std::filesystem::path& path, std::size_t max_bytes) {
-  if (!std::filesystem::exists(path)) {
-    throw Error("cannot read " + path.string() + ": there is no such file");
+  ExrReader reader(path, max_bytes);
+  std::vector<ExrPart> parts;
+  for (std::size_t i = 0; i < reader.parts().size(); ++i) {
+    parts.push_back(reader.Read(i));
   }
-  try {
-    Imf::MultiPartInputFile file(path.c_str());
-    std::vector<ExrPart> parts;
-    std::size_t bytes_left = max_bytes;
-    for (int i = 0; i < file.parts(); ++i) {
-      parts.push_back(ReadPart(file, i, bytes_left));
-    }
-    return parts;
-  } catch (const std::exception& e) {
-    throw BadData(path.string() + ": not a readable OpenEXR file: " + e.what());
-  }
+  return parts;
 }
 
 const ExrPart& FindPart(const std::vector<ExrPart>& parts,

@@ -15,7 +15,7 @@ using ExrAttributes = std::map<std::string, std::string>;
 enum class ExrPixels {
   kFloat,  ///< FLOAT, ZIP
   kHalf,   ///< HALF, PIZ: values are rounded to 11 significant bits
-  kCodes,  ///< UINT, PIZ: whole numbers from 0 to 2^24
+  kCodes,  ///< UINT, PXR24: whole numbers from 0 to 2^24
 };
 
 /// One part of an OpenEXR file held in memory: 32-bit floats, channel after channel

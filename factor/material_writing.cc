@@ -14,14 +14,12 @@ namespace nacre::factor {
 namespace {
 
 template <class T>
-ExrPart ToPart(const char* name,
-               const internal::Sheet& sheet,
-               const std::vector<std::string>& channels,
-               const std::vector<T>& values) {
-  ExrPart part{name,
+ExrPart ToPart(const internal::PartPlan& plan, const T* values) {
+  const internal::Sheet& sheet = plan.sheet;
+  ExrPart part{plan.name,
                sheet.width * sheet.columns,
                sheet.height * sheet.rows,
-               channels,
+               plan.channels,
                std::vector<float>(sheet.Size()),
                {}};
   sheet.ForEach([&](std::size_t in_sheet, std::size_t in_material) {
@@ -122,41 +120,81 @@ Json StepsToJson(const Steps& steps, const internal::MaterialCodes& codes) {
           {"row_scale", fmt::format("{}", steps.row_scale)}};
 }
 
+bool IsNeeded(const internal::PartPlan& plan, const Material& m) {
+  switch (plan.kind) {
+    case internal::PartKind::kRowScale:
+      return std::any_of(m.row_scale.begin(), m.row_scale.end(), [](float scale) {
+        return scale != 1;
+      });
+    case internal::PartKind::kCluster:
+      return m.cluster_count > 1;
+    case internal::PartKind::kAlbedo:
+    case internal::PartKind::kFactors:
+    case internal::PartKind::kKernels:
+      break;
+  }
+  return true;
+}
+
+// The part of a plan; `codes` are empty without steps.
+ExrPart PartOf(const internal::PartPlan& plan,
+               const Material& m,
+               const internal::MaterialCodes& codes) {
+  const bool is_coded = !m.steps.empty();
+  const auto values = [&](const std::vector<float>& floats,
+                          const std::vector<float>& coded) {
+    const std::size_t set =
+        plan.channel < 0 ? 0 : static_cast<std::size_t>(plan.channel);
+    return (is_coded ? coded : floats).data() + set * plan.sheet.Size();
+  };
+  ExrPart part;
+  switch (plan.kind) {
+    case internal::PartKind::kAlbedo:
+      part = ToPart(plan, m.albedo.data());
+      part.pixels =
+          is_coded && FitsHalf(m.albedo) ? ExrPixels::kHalf : ExrPixels::kFloat;
+      OrderChannels(part);
+      return part;
+    case internal::PartKind::kRowScale:
+      part = ToPart(plan, values(m.row_scale, codes.row_scale));
+      break;
+    case internal::PartKind::kFactors:
+      part = ToPart(plan, values(m.f, codes.f));
+      break;
+    case internal::PartKind::kKernels:
+      part = ToPart(plan, values(m.h, codes.h));
+      break;
+    case internal::PartKind::kCluster:
+      part = ToPart(plan, m.cluster.data());
+      part.pixels = is_coded ? ExrPixels::kCodes : ExrPixels::kFloat;
+      return part;
+  }
+  if (is_coded) {
+    part.pixels = ExrPixels::kCodes;
+    internal::Fold(plan.sheet, part);
+  }
+  OrderChannels(part);
+  return part;
+}
+
 std::vector<ExrPart> ToParts(const Material& m) {
-  const internal::Layout layout = internal::LayoutOf(m);
   ExrAttributes attributes = AttributesOf(m);
   internal::MaterialCodes codes;
-  ExrPixels pixels = ExrPixels::kFloat;
   if (!m.steps.empty()) {
     codes = internal::Encode(m);
     attributes["nacre.steps"] = StepsToJson(m.steps, codes).dump();
-    pixels = ExrPixels::kCodes;
   }
-  const auto values =
-      [&](const std::vector<float>& floats,
-          const std::vector<float>& coded) -> const std::vector<float>& {
-    return m.steps.empty() ? floats : coded;
-  };
-  std::vector<ExrPart> parts{
-      ToPart("albedo", layout.points, m.channels, m.albedo),
-      ToPart(
-          "row_scale", layout.points, m.channels, values(m.row_scale, codes.row_scale)),
-      ToPart("factors", layout.factors, internal::MapChannels(m), values(m.f, codes.f)),
-      ToPart(
-          "kernels", layout.kernels, internal::KernelChannels(m), values(m.h, codes.h)),
-      ToPart("cluster", layout.cluster, internal::SharedChannel(), m.cluster)};
-  for (ExrPart& part : parts) {
-    OrderChannels(part);
-    part.pixels = pixels;
+  std::vector<ExrPart> parts;
+  Json checksums = Json::object();
+  for (const internal::PartPlan& plan : internal::PlanParts(m, false)) {
+    if (IsNeeded(plan, m)) {
+      parts.push_back(PartOf(plan, m, codes));
+      checksums[plan.name] = internal::PartChecksum(parts.back());
+    }
   }
-  if (!m.steps.empty() && FitsHalf(m.albedo)) {
-    parts[0].pixels = ExrPixels::kHalf;
-  } else {
-    parts[0].pixels = ExrPixels::kFloat;
-  }
+  attributes["nacre.parts"] = checksums.dump();
+  attributes["nacre.checksum"] = internal::AttributesChecksum(attributes);
   parts[0].attributes = std::move(attributes);
-  parts[0].attributes["nacre.checksum"] =
-      internal::Checksum(parts[0].attributes, parts);
   return parts;
 }
 

@@ -1,17 +1,19 @@
 #pragma once
 
-/// *.nacre.exr: five parts, each with the material's own channels, so that every EXR
-/// viewer shows something sensible:
+/// *.nacre.exr: parts with the material's own channels, so that every EXR viewer shows
+/// something sensible:
 ///   albedo     points_x × points_y                     first: what viewers open
-///   row_scale  points_x × points_y
+///   row_scale  points_x × points_y                     missing: 1 everywhere
 ///   factors    (terms · map width) × map height        maps f_j side by side
 ///   kernels    (kernels · core) × (clusters · core)    kernels h_j, a cluster a row
 ///              (reciprocal: (core + 1) / 2 rows, the rest being their mirror image;
 ///              profiles: a pixel a kernel)
-///   cluster    points_x × points_y, channel Y
-/// Where the material has steps, values are whole numbers instead, times a step. Maps
-/// that all channels share are channel Y.
-/// Everything else is in string attributes of the first part, prefixed "nacre.".
+///   cluster    points_x × points_y, channel Y          missing: one cluster
+/// Maps and kernels that all channels share are channel Y; those of one channel are a
+/// part of its own, factors.R, kernels.R, …; a grey material's albedo and row_scale are
+/// channel Y. Where the material has steps, values are whole numbers instead, times a
+/// step. Everything else is in string attributes of the first part, prefixed "nacre.".
+/// Up to version 5 there were always these five parts, of all channels.
 
 #include "core/exr.h"
 #include "factor/material.h"
@@ -22,8 +24,10 @@
 namespace nacre::factor::internal {
 
 inline constexpr const char* kFormat = "material";
-inline constexpr const char* kVersion = "5";
-/// The same without rest.
+inline constexpr const char* kVersion = "6";
+/// The same with a part for all channels and one checksum.
+inline constexpr const char* kVersionOfOnePart = "5";
+/// Without rest.
 inline constexpr const char* kVersionWithoutRest = "4";
 /// Without tucker and profiles.
 inline constexpr const char* kVersionWithoutOrder = "3";
@@ -68,26 +72,29 @@ struct Sheet {
   }
 };
 
-struct Layout {
-  Sheet points;  ///< albedo, row_scale
-  Sheet factors;
-  Sheet kernels;
-  Sheet cluster;
+/// What a part of the file holds.
+enum class PartKind { kAlbedo, kRowScale, kFactors, kKernels, kCluster };
+
+struct PartPlan {
+  PartKind kind{};
+  std::string name;
+  Sheet sheet;
+  std::vector<std::string> channels;
+  /// The channel that needs it; -1: all do.
+  int channel = -1;
 };
 
-Layout LayoutOf(const Material& m);
+/// The parts that a file may have, in its order. `is_whole`: as up to version 5.
+std::vector<PartPlan> PlanParts(const Material& m, bool is_whole);
 
-/// The channel of what all of a material's channels share.
-const std::vector<std::string>& SharedChannel();
+/// Of all attributes that start with "nacre." but itself.
+std::string AttributesChecksum(const ExrAttributes& attributes);
 
-/// The channels of the factor maps.
-const std::vector<std::string>& MapChannels(const Material& m);
+/// Of a part's values, in its order of channels.
+std::string PartChecksum(const ExrPart& part);
 
-/// The channels of the kernels.
-const std::vector<std::string>& KernelChannels(const Material& m);
-
-/// Of all attributes and values but itself, in the order of the file.
-std::string Checksum(const ExrAttributes& attributes,
-                     const std::vector<ExrPart>& parts);
+/// Up to version 5: of all attributes and values, in the order of the file.
+std::string WholeChecksum(const ExrAttributes& attributes,
+                          const std::vector<ExrPart>& parts);
 
 }  // namespace nacre::factor::internal

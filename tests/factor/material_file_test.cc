@@ -1,9 +1,10 @@
+#include "factor/material_file.h"
+
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/hash.h"
 #include "core/random.h"
-#include "factor/material.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
 
@@ -11,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <fmt/format.h>
 #include <limits>
 
 namespace nacre::factor {
@@ -53,6 +55,29 @@ std::string ReadComplaint(const std::filesystem::path& path) {
   return "none";
 }
 
+// Checksums as factor/README.md tells, so that what a file says is looked at.
+void Seal(std::vector<ExrPart>& parts) {
+  std::string sums;
+  for (const ExrPart& part : parts) {
+    sums += fmt::format("{}\"{}\":\"{:016x}\"",
+                        sums.empty() ? "" : ",",
+                        part.name,
+                        Hash64(part.values.data(), part.values.size() * sizeof(float)));
+  }
+  ExrAttributes& attributes = parts[0].attributes;
+  attributes["nacre.parts"] = "{" + sums + "}";
+  attributes.erase("nacre.checksum");
+  std::string text;
+  for (const auto& [key, value] : attributes) {
+    text += key.starts_with("nacre.") ? key + '=' + value + '\n' : "";
+  }
+  attributes["nacre.checksum"] = HashHex(text.data(), text.size());
+}
+
+ExrPart& PartOf(std::vector<ExrPart>& parts, const std::string& name) {
+  return const_cast<ExrPart&>(FindPart(parts, name, "a test's file"));
+}
+
 TEST(MaterialFile, RoundTripIsExact) {
   const TempFolder folder;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
@@ -86,9 +111,10 @@ TEST(MaterialFile, ViewersSeeTheAlbedoFirst) {
   EXPECT_EQ(parts[0].channels, (std::vector<std::string>{"R", "G", "B"}));
   EXPECT_EQ(parts[0].values, m.albedo);
   // Map 1 stands to the right of map 0.
-  const ExrPart& factors = FindPart(parts, "factors", "m");
+  const ExrPart& factors = FindPart(parts, "factors.G", "m");
+  EXPECT_EQ(factors.channels, std::vector<std::string>{"G"});
   EXPECT_EQ(factors.width, 10);
-  EXPECT_EQ(factors.values[5], m.FactorMap(0, 1)[0]);
+  EXPECT_EQ(factors.values[5], m.FactorMap(1, 1)[0]);
 }
 
 TEST(MaterialFile, EveryFlippedBitIsFoundOrHarmless) {
@@ -130,7 +156,7 @@ TEST(MaterialFile, ChangedValuesAndAttributesAreFound) {
   WriteMaterial(folder / "m.nacre.exr", MakeMaterial(9));
   const std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
   std::vector<ExrPart> changed = parts;
-  changed[2].values[3] += 1e-6F;
+  PartOf(changed, "factors.R").values[3] += 1e-6F;
   WriteExr(folder / "value.exr", changed);
   EXPECT_THAT(ReadComplaint(folder / "value.exr"), HasSubstr("checksum"));
   changed = parts;
@@ -146,9 +172,9 @@ TEST(MaterialFile, BadAttributesAndPartsAreNamed) {
   const std::vector<std::array<const char*, 3>> cases{
       {"nacre.terms", "two", "nacre.terms is 'two', not a number"},
       {"nacre.terms", "0", "nacre.terms is 0, not a count"},
-      {"nacre.terms", "3", "part 'factors' is 10 x 4 pixels"},
-      {"nacre.terms", "1000000", "part 'factors'"},
-      {"nacre.core", "5", "part 'kernels'"},
+      {"nacre.terms", "3", "part 'factors.R' is 10 x 4 pixels"},
+      {"nacre.terms", "1000000", "part 'factors.R'"},
+      {"nacre.core", "5", "part 'kernels.R'"},
       {"nacre.points", "5", "nacre.points is '5', not two counts"},
       {"nacre.points", "5 0", "out of range"},
       {"nacre.transform", "cubic", "none of 'linear', 'sqrt' and 'log'"},
@@ -157,7 +183,7 @@ TEST(MaterialFile, BadAttributesAndPartsAreNamed) {
       {"nacre.b", "[1, 2, 3]", "a number in quotes"},
       {"nacre.channels", "[\"R\", \"G\", \"X\"]", "no channel 'X'"},
       {"nacre.channels", "[1]", "not a name"},
-      {"nacre.clusters", "1", "part 'kernels'"},
+      {"nacre.clusters", "1", "part 'kernels.R'"},
       {"nacre.pitch_mm", "nan", "pitch_mm"},
       {"nacre.error_curve", "[[1, 2]]", "nacre.error_curve has an entry"},
       {"nacre.error", "{", "nacre.error"}};
@@ -172,17 +198,32 @@ TEST(MaterialFile, BadAttributesAndPartsAreNamed) {
   WriteExr(folder / "bad.exr", changed);
   EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("nacre.eta is missing"));
   changed = parts;
-  changed.erase(changed.begin() + 3);
+  std::erase_if(changed, [](const ExrPart& part) { return part.name == "kernels.G"; });
   WriteExr(folder / "bad.exr", changed);
-  EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("no part 'kernels'"));
+  EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("no part 'kernels.G'"));
   changed = parts;
-  changed[2].values[4] = std::numeric_limits<float>::quiet_NaN();
+  PartOf(changed, "factors.R").values[4] = std::numeric_limits<float>::quiet_NaN();
+  Seal(changed);
   WriteExr(folder / "bad.exr", changed);
   EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("f: value 4 is nan"));
   changed = parts;
-  changed[4].values[0] = 0.5F;
+  PartOf(changed, "cluster").values[0] = 0.5F;
+  Seal(changed);
   WriteExr(folder / "bad.exr", changed);
   EXPECT_THAT(ReadComplaint(folder / "bad.exr"), HasSubstr("part 'cluster' holds 0.5"));
+}
+
+// The parts of one kind as one part of all channels, as up to version 5.
+ExrPart Together(std::vector<ExrPart>& parts, const std::string& name) {
+  ExrPart all = PartOf(parts, name + ".R");
+  all.name = name;
+  all.attributes.clear();  // has the name, too
+  all.channels = {"R", "G", "B"};
+  for (const char* channel : {".G", ".B"}) {
+    const ExrPart& one = PartOf(parts, name + channel);
+    all.values.insert(all.values.end(), one.values.begin(), one.values.end());
+  }
+  return all;
 }
 
 // What version 1 wrote: a sum of floats, without form and margin.
@@ -190,9 +231,15 @@ TEST(MaterialFile, FilesOfTheFirstVersionAreRead) {
   const TempFolder folder;
   const Material m = MakeMaterial(2);
   WriteMaterial(folder / "m.nacre.exr", m);
-  std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
+  std::vector<ExrPart> now = ReadExr(folder / "m.nacre.exr");
+  std::vector<ExrPart> parts{PartOf(now, "albedo"),
+                             PartOf(now, "row_scale"),
+                             Together(now, "factors"),
+                             Together(now, "kernels"),
+                             PartOf(now, "cluster")};
   ExrAttributes& attributes = parts[0].attributes;
-  for (const char* key : {"nacre.form", "nacre.margin", "nacre.checksum"}) {
+  for (const char* key :
+       {"nacre.form", "nacre.margin", "nacre.parts", "nacre.checksum"}) {
     attributes.erase(key);
   }
   attributes["nacre.version"] = "1";
@@ -207,6 +254,12 @@ TEST(MaterialFile, FilesOfTheFirstVersionAreRead) {
   attributes["nacre.checksum"] = HashHex(text.data(), text.size());
   WriteExr(folder / "old.nacre.exr", parts);
   ExpectEqual(ReadMaterial(folder / "old.nacre.exr"), m);
+  const MaterialFile file(folder / "old.nacre.exr");
+  ExpectEqual(file.Channel(2), ChannelOf(m, 2));
+  EXPECT_EQ(file.channels_read(), 3);
+  parts[2].values[3] += 1e-6F;
+  WriteExr(folder / "old.nacre.exr", parts);
+  EXPECT_THAT(ReadComplaint(folder / "old.nacre.exr"), HasSubstr("checksum"));
 }
 
 TEST(MaterialFile, OtherFilesAreNamed) {
@@ -215,9 +268,83 @@ TEST(MaterialFile, OtherFilesAreNamed) {
   EXPECT_THAT(ReadComplaint(folder / "picture.exr"), HasSubstr("is not a material"));
   WriteMaterial(folder / "m.nacre.exr", MakeMaterial(9));
   std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
-  parts[0].attributes["nacre.version"] = "6";
+  parts[0].attributes["nacre.version"] = "7";
   WriteExr(folder / "newer.exr", parts);
   EXPECT_THAT(ReadComplaint(folder / "newer.exr"), HasSubstr("newer nacre"));
+}
+
+TEST(MaterialFile, OneChannelIsThatOfTheWhole) {
+  const Material m = MakeMaterial(3);
+  std::vector<float> whole(static_cast<std::size_t>(m.WindowSize()));
+  std::vector<float> alone(whole.size());
+  for (int c = 0; c < 3; ++c) {
+    const Material one = ChannelOf(m, c);
+    Validate(one, "one channel");
+    EXPECT_EQ(one.channels, std::vector<std::string>{m.channels[std::size_t(c)]});
+    m.EvaluateWindow(c, 1, 2, whole.data());
+    one.EvaluateWindow(0, 1, 2, alone.data());
+    EXPECT_EQ(whole, alone);
+  }
+}
+
+TEST(MaterialFile, ChannelsAreReadWhenTheyAreAskedFor) {
+  const TempFolder folder;
+  const Material m = MakeMaterial(5);
+  WriteMaterial(folder / "m.nacre.exr", m);
+  const MaterialFile file(folder / "m.nacre.exr");
+  EXPECT_EQ(file.header().channels, m.channels);
+  EXPECT_TRUE(file.header().f.empty());
+  EXPECT_EQ(file.values_read(), 0);
+  ExpectEqual(file.Channel(1), ChannelOf(m, 1));
+  EXPECT_EQ(&file.Channel(1), &file.Channel(1));
+  EXPECT_EQ(file.channels_read(), 1);
+  const std::int64_t of_one = file.values_read();
+  EXPECT_EQ(of_one,
+            (std::ssize(m.f) + std::ssize(m.h)) / 3 + 2 * std::ssize(m.albedo) +
+                m.PointCount());
+  ExpectEqual(file.Channel(0), ChannelOf(m, 0));
+  // What channels share isn't read again.
+  EXPECT_EQ(file.values_read() - of_one, (std::ssize(m.f) + std::ssize(m.h)) / 3);
+}
+
+// A channel's damage is found when it is read, and only then.
+TEST(MaterialFile, DamageIsFoundInTheChannelThatHasIt) {
+  const TempFolder folder;
+  WriteMaterial(folder / "m.nacre.exr", MakeMaterial(5));
+  std::vector<ExrPart> parts = ReadExr(folder / "m.nacre.exr");
+  PartOf(parts, "kernels.B").values[0] += 1e-6F;
+  WriteExr(folder / "m.nacre.exr", parts);
+  const MaterialFile file(folder / "m.nacre.exr");
+  EXPECT_NO_THROW(file.Channel(0));
+  for (int n = 0; n < 2; ++n) {
+    EXPECT_THROW(file.Channel(2), Error);
+  }
+  EXPECT_NO_THROW(file.Channel(1));
+}
+
+TEST(MaterialFile, GreyChannelsAreKeptOnce) {
+  const TempFolder folder;
+  Material m = MakeMaterial(5);
+  const std::vector<std::string> names = m.channels;
+  m = ChannelOf(m, 1);
+  m.channels = names;
+  m.is_grey = true;
+  for (auto* values : {&m.row_scale, &m.albedo}) {
+    const std::vector<float> once = *values;
+    values->insert(values->end(), once.begin(), once.end());
+    values->insert(values->end(), once.begin(), once.end());
+  }
+  m.a.resize(3, m.a[0]);
+  m.b.resize(3, m.b[0]);
+  WriteMaterial(folder / "m.nacre.exr", m);
+  ExpectEqual(ReadMaterial(folder / "m.nacre.exr"), m);
+  const MaterialFile file(folder / "m.nacre.exr");
+  for (int c = 0; c < 3; ++c) {
+    ExpectEqual(file.Channel(c), ChannelOf(m, c));
+  }
+  EXPECT_EQ(file.values_read(), std::ssize(m.f) + std::ssize(m.h) + 3 * m.PointCount());
+  m.albedo.back() += 1;
+  EXPECT_THROW(WriteMaterial(folder / "m.nacre.exr", m), Error);
 }
 
 TEST(MaterialFile, RefusesToWriteNonsense) {

@@ -1,16 +1,13 @@
-// Reads *.nacre.exr (internal/material_layout.h) and checks all of it.
+#include "factor/internal/material_attributes.h"
 
 #include "core/error.h"
-#include "core/exr.h"
 #include "core/json.h"
-#include "factor/internal/material_codes.h"
 #include "factor/internal/material_layout.h"
-#include "factor/material.h"
 
 #include <cmath>
 #include <fmt/format.h>
 
-namespace nacre::factor {
+namespace nacre::factor::internal {
 namespace {
 
 // Reads the attributes of one file, naming file and attribute where they make no sense.
@@ -70,6 +67,23 @@ class AttributeReader {
   std::string path_;
 };
 
+void CheckVersion(const AttributeReader& attributes) {
+  const std::string& version = attributes.Text("version");
+  for (const char* known : {kVersion,
+                            kVersionOfOnePart,
+                            kVersionWithoutRest,
+                            kVersionWithoutOrder,
+                            kVersionWithoutTaps,
+                            kOldVersion}) {
+    if (version == known) {
+      return;
+    }
+  }
+  throw attributes.At("version",
+                      "is " + version + "; this build reads " + kOldVersion + " to " +
+                          kVersion + ": a newer nacre is needed");
+}
+
 int ParseCount(const AttributeReader& attributes, const std::string& name, int most) {
   const double count = attributes.Number(name);
   if (!(count >= 0 && count <= most && count == std::floor(count))) {
@@ -126,7 +140,7 @@ void ReadErrors(const AttributeReader& attributes, Material& m) {
   }
 }
 
-Material ReadAttributes(const AttributeReader& attributes) {
+Material ReadFields(const AttributeReader& attributes) {
   Material m;
   const std::string& points = attributes.Text("points");
   const auto space = points.find(' ');
@@ -147,7 +161,7 @@ Material ReadAttributes(const AttributeReader& attributes) {
   m.eta = attributes.Number("eta");
   m.method = attributes.Text("method");
   m.transform = ParseTransform(attributes);
-  if (attributes.Text("version") != internal::kOldVersion) {
+  if (attributes.Text("version") != kOldVersion) {
     m.form = ParseForm(attributes);
     const double margin = attributes.Number("margin");
     if (!(margin >= 0 && margin <= m.core && margin == std::floor(margin))) {
@@ -161,12 +175,12 @@ Material ReadAttributes(const AttributeReader& attributes) {
     }
   }
   const std::string& version = attributes.Text("version");
-  const bool has_order =
-      version == internal::kVersion || version == internal::kVersionWithoutRest;
-  if (has_order || version == internal::kVersionWithoutOrder) {
+  const bool has_rest = version == kVersion || version == kVersionOfOnePart;
+  const bool has_order = has_rest || version == kVersionWithoutRest;
+  if (has_order || version == kVersionWithoutOrder) {
     m.taps = attributes.Integer("taps");
   }
-  if (version == internal::kVersion) {
+  if (has_rest) {
     m.rest = ParseCount(attributes, "rest", 256);
     m.is_grey = ParseCount(attributes, "grey", 1) == 1;
   }
@@ -194,57 +208,9 @@ Material ReadAttributes(const AttributeReader& attributes) {
   return m;
 }
 
-template <class T>
-std::vector<T> FromPart(const std::vector<ExrPart>& parts,
-                        const char* name,
-                        const internal::Sheet& sheet,
-                        const std::vector<std::string>& channels,
-                        const std::filesystem::path& path) {
-  const ExrPart& part = FindPart(parts, name, path);
-  const std::int64_t width = std::int64_t{sheet.width} * sheet.columns;
-  const std::int64_t height = std::int64_t{sheet.height} * sheet.rows;
-  if (part.width != width || part.height != height ||
-      part.channels.size() != channels.size()) {
-    throw BadData(
-        fmt::format("{}: part '{}' is {} x {} pixels of {} channels where {} x {} of "
-                    "{} are expected",
-                    path.string(),
-                    name,
-                    part.width,
-                    part.height,
-                    part.channels.size(),
-                    width,
-                    height,
-                    channels.size()));
-  }
-  std::vector<const float*> planes;
-  for (const std::string& channel : channels) {
-    const int c = part.FindChannel(channel);
-    if (c < 0) {
-      throw BadData(fmt::format(
-          "{}: part '{}' has no channel '{}'", path.string(), name, channel));
-    }
-    planes.push_back(part.Channel(static_cast<std::size_t>(c)));
-  }
-  std::vector<T> values(sheet.Size());
-  const std::size_t plane_size = part.PixelCount();
-  sheet.ForEach([&](std::size_t in_sheet, std::size_t in_material) {
-    const float value = planes[in_sheet / plane_size][in_sheet % plane_size];
-    if constexpr (std::is_same_v<T, std::uint8_t>) {
-      if (!(value >= 0 && value <= 255 && value == std::floor(value))) {
-        throw BadData(fmt::format("{}: part '{}' holds {}, not a number of a cluster",
-                                  path.string(),
-                                  name,
-                                  value));
-      }
-    }
-    values[in_material] = static_cast<T>(value);
-  });
-  return values;
-}
-
-// Values where the file holds whole numbers; `m` comes with these.
-void ReadSteps(const AttributeReader& attributes, Material& m) {
+// Steps of the whole numbers that the file holds.
+void ReadSteps(const AttributeReader& attributes, MaterialHeader& header) {
+  Material& m = header.material;
   const Json json = attributes.List("steps");
   for (const char* key : {"f", "f_least", "h", "h_least", "row_scale"}) {
     if (!json.contains(key)) {
@@ -270,52 +236,43 @@ void ReadSteps(const AttributeReader& attributes, Material& m) {
   };
   require("f", std::ssize(m.steps.f), std::int64_t{m.MapSets()} * m.MapCount());
   require("h", std::ssize(m.steps.h), m.KernelSets());
-  internal::Decode(attributes.Parse("steps", json["f_least"]),
-                   attributes.Parse("steps", json["h_least"]),
-                   m);
+  header.f_least = attributes.Parse("steps", json["f_least"]);
+  header.h_least = attributes.Parse("steps", json["h_least"]);
+}
+
+void ReadChecksums(const AttributeReader& attributes, MaterialHeader& header) {
+  header.checksum = attributes.Text("checksum");
+  header.is_whole = attributes.Text("version") != kVersion;
+  if (header.is_whole) {
+    return;
+  }
+  const Json parts = attributes.List("parts");
+  for (const auto& [name, checksum] : parts.items()) {
+    if (!checksum.is_string()) {
+      throw attributes.At("parts", "holds " + checksum.dump() + ", not a checksum");
+    }
+    header.parts[name] = checksum.get<std::string>();
+  }
 }
 
 }  // namespace
 
-Material ReadMaterial(const std::filesystem::path& path) {
-  const std::vector<ExrPart> parts = ReadExr(path, std::size_t{4} << 30);
-  const ExrAttributes& found = parts.front().attributes;
+MaterialHeader ReadMaterialHeader(const ExrAttributes& found, const std::string& path) {
   const auto format = found.find("nacre.format");
-  if (format == found.end() || format->second != internal::kFormat) {
-    throw BadData(path.string() +
+  if (format == found.end() || format->second != kFormat) {
+    throw BadData(path +
                   ": is not a material (attribute nacre.format); expected a file that "
                   "'nacre factor' wrote");
   }
-  const AttributeReader attributes(found, path.string());
-  const std::string& version = attributes.Text("version");
-  if (version != internal::kVersion && version != internal::kVersionWithoutRest &&
-      version != internal::kVersionWithoutOrder &&
-      version != internal::kVersionWithoutTaps && version != internal::kOldVersion) {
-    throw attributes.At("version",
-                        "is " + version + "; this build reads " +
-                            internal::kOldVersion + " to " + internal::kVersion +
-                            ": a newer nacre is needed");
-  }
-  Material m = ReadAttributes(attributes);
-  const internal::Layout layout = internal::LayoutOf(m);
-  m.albedo = FromPart<float>(parts, "albedo", layout.points, m.channels, path);
-  m.row_scale = FromPart<float>(parts, "row_scale", layout.points, m.channels, path);
-  m.f =
-      FromPart<float>(parts, "factors", layout.factors, internal::MapChannels(m), path);
-  m.h = FromPart<float>(
-      parts, "kernels", layout.kernels, internal::KernelChannels(m), path);
-  m.cluster = FromPart<std::uint8_t>(
-      parts, "cluster", layout.cluster, internal::SharedChannel(), path);
+  const AttributeReader attributes(found, path);
+  CheckVersion(attributes);
+  MaterialHeader header;
+  header.material = ReadFields(attributes);
   if (found.contains("nacre.steps")) {
-    ReadSteps(attributes, m);
+    ReadSteps(attributes, header);
   }
-  Validate(m, path.string());
-  if (attributes.Text("checksum") != internal::Checksum(found, parts)) {
-    throw BadData(path.string() +
-                  ": its checksum doesn't match: the file was damaged after it was "
-                  "written; make it again with 'nacre factor'");
-  }
-  return m;
+  ReadChecksums(attributes, header);
+  return header;
 }
 
-}  // namespace nacre::factor
+}  // namespace nacre::factor::internal
