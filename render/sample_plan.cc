@@ -13,8 +13,9 @@ constexpr int kLargestPass = 16;
 constexpr int kStep = 4;
 constexpr int kEnough = 65536;
 
-int WantedSamples(double variance, double level) {
-  const double wanted = std::sqrt(variance / level);
+// Of a pixel whose samples spread by `deviation`, at a level v / n².
+int WantedSamples(double deviation, double level) {
+  const double wanted = deviation / std::sqrt(level);
   return wanted < kEnough ? static_cast<int>(std::ceil(wanted)) : kEnough;
 }
 
@@ -23,7 +24,8 @@ template <class Total>
 double FindLevel(double wanted, Total&& total) {
   double low = 1e-30;
   double high = 1e30;
-  for (int i = 0; i < 100; ++i) {
+  constexpr int kSteps = 48;  // to 10⁻¹² of it
+  for (int i = 0; i < kSteps; ++i) {
     const double middle = std::sqrt(low * high);
     (total(middle) > wanted ? low : high) = middle;
   }
@@ -81,6 +83,8 @@ std::vector<SamplePlan::Tile> SamplePlan::Survey(const Accumulator& film) const 
       }
       Tile& tile = tiles[static_cast<std::size_t>(y * tiles_x_ + x)];
       tile.variance = 0.5 * (tile.variance + sum / count);
+      tile.pixels = static_cast<double>(PixelsOf(std::int64_t{y} * tiles_x_ + x));
+      tile.deviation = std::sqrt(tile.variance / tile.pixels);
     }
   }
   return tiles;
@@ -97,12 +101,11 @@ std::vector<int> SamplePlan::Adapted(const std::vector<Tile>& tiles,
                                      double level) const {
   std::vector<int> next;
   bool more = false;
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    const auto pixels = static_cast<double>(PixelsOf(static_cast<std::int64_t>(i)));
-    const int wanted = WantedSamples(tiles[i].variance / pixels, level);
+  for (const Tile& tile : tiles) {
+    const int wanted = WantedSamples(tile.deviation, level);
     const int whole = (wanted + kStep / 2) / kStep * kStep;
-    next.push_back(std::clamp(whole, tiles[i].done, 2 * tiles[i].done));
-    more = more || next.back() > tiles[i].done;
+    next.push_back(std::clamp(whole, tile.done, 2 * tile.done));
+    more = more || next.back() > tile.done;
   }
   return more ? next : std::vector<int>();
 }
@@ -110,10 +113,9 @@ std::vector<int> SamplePlan::Adapted(const std::vector<Tile>& tiles,
 double SamplePlan::LevelForSamples(const std::vector<Tile>& tiles) const {
   return FindLevel(static_cast<double>(SamplesAtMost()), [&](double level) {
     double samples = 0;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      const auto pixels = static_cast<double>(PixelsOf(static_cast<std::int64_t>(i)));
-      samples += pixels * std::max(tiles[i].done,
-                                   WantedSamples(tiles[i].variance / pixels, level));
+    for (const Tile& tile : tiles) {
+      samples +=
+          tile.pixels * std::max(tile.done, WantedSamples(tile.deviation, level));
     }
     return samples;
   });
@@ -123,10 +125,8 @@ double SamplePlan::LevelForError(const std::vector<Tile>& tiles, double error2) 
   // The error grows with the level: its inverse falls.
   return FindLevel(1 / error2, [&](double level) {
     double sum = 0;
-    for (std::size_t i = 0; i < tiles.size(); ++i) {
-      const auto pixels = static_cast<double>(PixelsOf(static_cast<std::int64_t>(i)));
-      sum += tiles[i].variance /
-             std::max(tiles[i].done, WantedSamples(tiles[i].variance / pixels, level));
+    for (const Tile& tile : tiles) {
+      sum += tile.variance / std::max(tile.done, WantedSamples(tile.deviation, level));
     }
     return sum > 0 ? 1 / sum : 1e300;
   });

@@ -48,7 +48,9 @@ class SamplePlan {
 
  private:
   struct Tile {
-    double variance = 0;  ///< of a sample, summed over its pixels
+    double variance = 0;   ///< of a sample, summed over its pixels
+    double deviation = 0;  ///< of a sample of one pixel
+    double pixels = 0;
     int done = 0;
   };
   std::vector<Tile> Survey(const Accumulator& film) const;

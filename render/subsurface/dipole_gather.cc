@@ -156,7 +156,10 @@ class Dipole final : public SubsurfaceModel {
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
                                          int thread_count) const override {
     return std::make_unique<DipoleGather>(
-        profiles_, GatherPatches(lit, patch_mm_), options_, thread_count);
+        profiles_,
+        GatherPatches(lit, patch_mm_, {}, thread_count),
+        options_,
+        thread_count);
   }
 
  private:

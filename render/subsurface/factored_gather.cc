@@ -326,7 +326,7 @@ class Factored final : public SubsurfaceModel {
   }
 
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
-                                         int /*thread_count*/) const override {
+                                         int thread_count) const override {
     // Of projections a point has several places, which overlap: they blur borders.
     const bool by_uv = mapping_.mapping() == Mapping::kTexture ||
                        mapping_.mapping() == Mapping::kWorld;
@@ -335,7 +335,10 @@ class Factored final : public SubsurfaceModel {
     })
                                : PartFunction();
     return std::make_unique<FactoredGather>(
-        windows_, GatherPatches(lit, PatchSizeMm(), part_of), mapping_, options_);
+        windows_,
+        GatherPatches(lit, PatchSizeMm(), part_of, thread_count),
+        mapping_,
+        options_);
   }
 
  private:

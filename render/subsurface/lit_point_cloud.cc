@@ -1,6 +1,7 @@
 #include "render/subsurface/lit_point_cloud.h"
 
 #include "core/error.h"
+#include "core/parallel.h"
 
 #include <algorithm>
 #include <array>
@@ -202,36 +203,49 @@ Patch MergePoints(std::span<const KeyedPoint> members) {
   return patch;
 }
 
-/// Calls visit(members) for each group; members come in an order of their own, whatever
+/// The patch of a group, whose members are brought into an order of their own, whatever
 /// that of the points was.
-template <class Visitor>
-void ForEachGroup(std::vector<KeyedPoint> keyed, Visitor&& visit) {
+Patch PatchOf(std::span<KeyedPoint> members) {
   const auto order = [](const KeyedPoint& k) {
     const Vec3 p = k.point->point.position_mm;
     const Color e = k.point->flux_density;
     return std::tuple(p.x, p.y, p.z, k.point->area_mm2, e.x, e.y, e.z);
   };
-  for (auto begin = keyed.begin(); begin != keyed.end();) {
-    const auto end = std::find_if(begin, keyed.end(), [&](const KeyedPoint& k) {
-      return k.key != begin->key || k.part != begin->part;
-    });
-    std::sort(begin, end, [&](const KeyedPoint& a, const KeyedPoint& b) {
-      return order(a) < order(b);
-    });
-    visit(std::span<const KeyedPoint>(begin, end));
-    begin = end;
-  }
+  std::sort(
+      members.begin(), members.end(), [&](const KeyedPoint& a, const KeyedPoint& b) {
+        return order(a) < order(b);
+      });
+  return MergePoints(members);
 }
 
 }  // namespace
 
 std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit,
                                  float side_mm,
-                                 const PartFunction& part_of) {
+                                 const PartFunction& part_of,
+                                 int thread_count) {
   Expect(side_mm > 0, "patches have a positive side");
-  std::vector<Patch> patches;
-  ForEachGroup(SortIntoVoxels(lit, side_mm, part_of),
-               [&](auto members) { patches.push_back(MergePoints(members)); });
+  std::vector<KeyedPoint> keyed = SortIntoVoxels(lit, side_mm, part_of);
+  std::vector<std::size_t> first;
+  for (std::size_t i = 0; i < keyed.size(); ++i) {
+    if (i == 0 || keyed[i].key != keyed[i - 1].key ||
+        keyed[i].part != keyed[i - 1].part) {
+      first.push_back(i);
+    }
+  }
+  std::vector<Patch> patches(first.size());
+  first.push_back(keyed.size());
+  constexpr std::int64_t kBlock = 1024;
+  ParallelForBlocks(
+      std::ssize(patches),
+      kBlock,
+      thread_count,
+      [&](std::int64_t begin, std::int64_t end) {
+        for (std::int64_t i = begin; i < end; ++i) {
+          const auto p = static_cast<std::size_t>(i);
+          patches[p] = PatchOf({keyed.data() + first[p], keyed.data() + first[p + 1]});
+        }
+      });
   return patches;
 }
 

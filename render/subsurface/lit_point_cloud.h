@@ -30,6 +30,7 @@ struct Patch {
 using PartFunction = std::function<int(const SurfacePoint&)>;
 std::vector<Patch> GatherPatches(const std::vector<LitPoint>& lit,
                                  float side_mm,
-                                 const PartFunction& part_of = {});
+                                 const PartFunction& part_of = {},
+                                 int thread_count = 1);
 
 }  // namespace nacre::render

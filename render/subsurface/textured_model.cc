@@ -174,9 +174,9 @@ class TexturedModel final : public SubsurfaceModel {
   }
 
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
-                                         int /*thread_count*/) const override {
+                                         int thread_count) const override {
     return std::make_unique<TexturedGather>(
-        medium_, shapes_, GatherPatches(lit, patch_mm_));
+        medium_, shapes_, GatherPatches(lit, patch_mm_, {}, thread_count));
   }
 
  private:
