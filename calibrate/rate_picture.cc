@@ -63,11 +63,10 @@ std::vector<double> RatePictures::Variances(const std::vector<float>& rates,
 
 std::vector<float> RatePictures::Rates(const acquire::Frame& frame, int channel) const {
   const double level = dark_.level.Counts(frame.exposure_us);
-  std::vector<float> rates;
-  rates.reserve(frame.counts.size());
-  for (const std::uint16_t count : frame.counts) {
-    rates.push_back(
-        static_cast<float>(linearity_.Linear(count - level) / frame.exposure_us));
+  std::vector<float> rates(frame.counts.size());
+  for (std::size_t k = 0; k < rates.size(); ++k) {
+    rates[k] = static_cast<float>(linearity_.Linear(frame.counts[k] - level) /
+                                  frame.exposure_us);
   }
   // Of a hot pixel that is cool in so short an exposure, the dark current is taken off:
   // what a spot's neighbours saw would be far worse.

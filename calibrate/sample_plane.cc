@@ -12,11 +12,10 @@
 namespace nacre::calibrate {
 namespace {
 
-// Where a beam aimed at a point of the sample plane is at a height.
-PointMm BeamAt(const Calibration& calibration, PointMm point, double height_mm) {
+// How far a beam aimed at a point of the sample plane goes aside, a mm of height.
+PointMm BeamSlope(const Calibration& calibration, PointMm point) {
   const acquire::ScanAngle angle = calibration.scan_map.AngleFromSample(point);
-  return {point.x - height_mm * std::tan(angle.x_rad) / std::cos(angle.y_rad),
-          point.y - height_mm * std::tan(angle.y_rad)};
+  return {-std::tan(angle.x_rad) / std::cos(angle.y_rad), -std::tan(angle.y_rad)};
 }
 
 }  // namespace
@@ -40,7 +39,8 @@ void AddSightings(const acquire::SessionReader& session,
   for (std::size_t k = 0; k < count; ++k) {
     const PointMm aim = aims[k];
     const PixelPoint expected = calibration.camera.PixelFromSample(aim);
-    const PixelPoint above = lifted.PixelFromSample(BeamAt(calibration, aim, 1));
+    const PointMm slope = BeamSlope(calibration, aim);
+    const PixelPoint above = lifted.PixelFromSample({aim.x + slope.x, aim.y + slope.y});
     const double jx = above.x - expected.x;
     const double jy = above.y - expected.y;
     const double length = std::hypot(jx, jy);
@@ -108,13 +108,14 @@ SamplePlane FitPlane(std::vector<Sighting> sightings, int& used) {
 PointMm OnSurface(const Calibration& calibration,
                   const SamplePlane& plane,
                   PointMm point) {
+  const PointMm slope = BeamSlope(calibration, point);
   PointMm hit = point;
   double height_mm = 0;
   constexpr int kRounds =
       6;  // each gains the product of the beam's and surface's slope
   for (int round = 0; round < kRounds; ++round) {
     height_mm = plane.height_mm + plane.slope_x * hit.x + plane.slope_y * hit.y;
-    hit = BeamAt(calibration, point, height_mm);
+    hit = {point.x + height_mm * slope.x, point.y + height_mm * slope.y};
   }
   // Along the plane's own axes, as in OnPlane.
   const double a = plane.slope_x;

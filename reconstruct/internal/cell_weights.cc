@@ -1,12 +1,9 @@
 #include "reconstruct/internal/cell_weights.h"
 
 #include "core/parallel.h"
-#include "reconstruct/internal/lanes.h"
 #include "reconstruct/internal/weight_box.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -17,28 +14,32 @@ constexpr double kFullCover = 0.999;
 
 // Cells are cut a few rows at a time, so that the pieces of a large picture needn't all
 // be there.
-constexpr int kRowsABand = 4;
+constexpr int kRowsABand = 8;
+
+std::int64_t BinCount(const calibrate::CameraGeometry& camera) {
+  return std::ssize(BinnedPicture(camera.width_px, camera.height_px).values);
+}
 
 }  // namespace
-
-// A row of weights, somewhere in a picture.
-struct CellWeights::Row {
-  std::int64_t place;  // of its first pixel
-  std::span<const float> weights;
-};
 
 class CellWeights::BoxBuilder {
  public:
   BoxBuilder(const CellLattice& lattice,
+             const PixelCutter& cutter,
              const calibrate::CameraGeometry& camera,
              const calibrate::SpotProfile& spot,
              const PixelModel& model)
-      : lattice_(lattice), camera_(camera), model_(model), sharpener_(spot, camera) {}
+      : pixels(std::int64_t{camera.width_px} * camera.height_px),
+        bins(BinCount(camera)),
+        lattice_(lattice),
+        cutter_(cutter),
+        camera_(camera),
+        model_(model),
+        sharpener_(spot, camera) {}
 
   // Of all cells in the band, in their order.
   void Add(RowBand band) {
-    const std::vector<PixelPiece> all =
-        CutPixels(lattice_, camera_, model_.place, band);
+    const std::vector<PixelPiece> all = cutter_.Cut(band);
     const std::int64_t begin = lattice_.Index(0, band.begin);
     const auto cells = static_cast<std::size_t>(lattice_.Index(0, band.end) - begin);
     // Pieces by cell (counting sort: within a cell they keep the order of the pixels).
@@ -59,13 +60,13 @@ class CellWeights::BoxBuilder {
     }
   }
 
-  Boxes pixels;
-  Boxes bins;
+  PixelBoxes pixels;
+  PixelBoxes bins;
 
  private:
   void AddCell(std::span<const PixelPiece* const> pieces) {
-    pixels.boxes.emplace_back();
-    bins.boxes.emplace_back();
+    pixels.Begin();
+    bins.Begin();
     double covered = 0;
     for (const PixelPiece* piece : pieces) {
       covered += piece->share;
@@ -75,17 +76,13 @@ class CellWeights::BoxBuilder {
     }
     WeightBox box(pieces.data(), pieces.size());
     box.Sharpen(sharpener_);
-    const std::int64_t count = std::int64_t{camera_.width_px} * camera_.height_px;
     const int bins_wide = BinnedPicture(camera_.width_px, 1).width;
-    const int bins_high = BinnedPicture(1, camera_.height_px).height;
     std::vector<float> binned;
     int bin_row = -1;
     int bin_left = 0;
     const auto flush = [&] {
       if (bin_row >= 0) {
-        Append(bins,
-               std::int64_t{bins_wide} * bins_high,
-               {std::int64_t{bin_row} * bins_wide + bin_left, binned});
+        bins.AddRow(std::int64_t{bin_row} * bins_wide + bin_left, binned);
       }
     };
     box.ForEachRow(camera_, [&](int row, int left, std::vector<float>& weights) {
@@ -96,7 +93,7 @@ class CellWeights::BoxBuilder {
                           ? 1.0F
                           : model_.factor[static_cast<std::size_t>(place) + x];
       }
-      Append(pixels, count, {place, weights});
+      pixels.AddRow(place, weights);
       if (!model_.with_bins) {
         return;
       }
@@ -117,56 +114,28 @@ class CellWeights::BoxBuilder {
     flush();
   }
 
-  // Rows begin where a whole number of vectors still lies in the picture.
-  static void Append(Boxes& boxes, std::int64_t pixel_count, const Row& row) {
-    Box& own = boxes.boxes.back();
-    if (own.row_count == 0) {
-      own.first_row = boxes.rows.size();
-      own.first_weight = boxes.weights.size();
-      own.row_width =
-          (static_cast<int>(row.weights.size()) + kLanes - 1) / kLanes * kLanes;
-    }
-    const std::int64_t start =
-        std::max<std::int64_t>(0, std::min(row.place, pixel_count - own.row_width));
-    boxes.rows.push_back(static_cast<std::uint32_t>(start));
-    ++own.row_count;
-    const std::size_t at = boxes.weights.size();
-    boxes.weights.resize(at + static_cast<std::size_t>(own.row_width), 0.0F);
-    std::copy(
-        row.weights.begin(),
-        row.weights.end(),
-        boxes.weights.begin() + static_cast<std::ptrdiff_t>(
-                                    at + static_cast<std::size_t>(row.place - start)));
-  }
-
   const CellLattice& lattice_;
+  const PixelCutter& cutter_;
   const calibrate::CameraGeometry& camera_;
   const PixelModel& model_;
   Sharpener sharpener_;
 };
-
-void CellWeights::Boxes::Append(const Boxes& others) {
-  for (Box box : others.boxes) {
-    box.first_row += rows.size();
-    box.first_weight += weights.size();
-    boxes.push_back(box);
-  }
-  rows.insert(rows.end(), others.rows.begin(), others.rows.end());
-  weights.insert(weights.end(), others.weights.begin(), others.weights.end());
-}
 
 CellWeights::CellWeights(const CellLattice& lattice,
                          const calibrate::CameraGeometry& camera,
                          const calibrate::SpotProfile& spot,
                          int thread_count,
                          const PixelModel& model)
-    : lattice_(lattice) {
+    : lattice_(lattice),
+      pixels_(std::int64_t{camera.width_px} * camera.height_px),
+      bins_(BinCount(camera)) {
+  const PixelCutter cutter(lattice_, camera, model.place);
   const int bands = (lattice.rows + kRowsABand - 1) / kRowsABand;
   const int at_once = ThreadCount(thread_count);
   for (int first = 0; first < bands; first += at_once) {
     const int count = std::min(at_once, bands - first);
     std::vector<BoxBuilder> builders(static_cast<std::size_t>(count),
-                                     BoxBuilder(lattice_, camera, spot, model));
+                                     BoxBuilder(lattice_, cutter, camera, spot, model));
     ParallelFor(count, thread_count, [&](std::int64_t n) {
       const int begin = (first + static_cast<int>(n)) * kRowsABand;
       builders[static_cast<std::size_t>(n)].Add(
@@ -177,103 +146,26 @@ CellWeights::CellWeights(const CellLattice& lattice,
       bins_.Append(builder.bins);
     }
   }
-  pixels_.weights.shrink_to_fit();
-  bins_.weights.shrink_to_fit();
+  pixels_.ShrinkToFit();
+  bins_.ShrinkToFit();
 }
-
-namespace {
-
-__attribute__((target_clones("avx512f", "avx2", "default"))) void SumBox(
-    const std::uint32_t* __restrict rows,
-    const float* __restrict weights,
-    std::pair<int, int> count_width,
-    const RateFrame& frame,
-    float* __restrict results) {
-  Lanes mean_sum = {};
-  Lanes variance_sum = {};
-  Lanes least_share = {};  // below 0: a pixel isn't usable
-  const auto [count, width] = count_width;
-  for (int row = 0; row < count; ++row) {
-    const float* rate_row = frame.rate.data() + rows[row];
-    const float* variance_row = frame.variance.data() + rows[row];
-    for (int x = 0; x < width; x += kLanes, weights += kLanes) {
-      Lanes weight;
-      Lanes rate;
-      Lanes variance;
-      std::memcpy(&weight, weights, sizeof weight);
-      std::memcpy(&rate, rate_row + x, sizeof rate);
-      std::memcpy(&variance, variance_row + x, sizeof variance);
-      const Lanes share = weight * weight * variance;
-      mean_sum += weight * rate;
-      variance_sum += share;
-      least_share = share < least_share ? share : least_share;
-    }
-  }
-  float mean = 0;
-  float variance = 0;
-  float least = 0;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    mean += mean_sum[lane];
-    variance += variance_sum[lane];
-    least = std::min(least, least_share[lane]);
-  }
-  results[0] = least < 0 ? 0.0F : mean;
-  results[1] = least < 0 ? -1.0F : variance;
-}
-
-__attribute__((target_clones("avx512f", "avx2", "default"))) float SumBins(
-    const std::uint32_t* __restrict rows,
-    const float* __restrict weights,
-    std::pair<int, int> count_width,
-    const float* __restrict values) {
-  Lanes sums = {};
-  const auto [count, width] = count_width;
-  for (int row = 0; row < count; ++row) {
-    for (int x = 0; x < width; x += kLanes, weights += kLanes) {
-      Lanes weight;
-      Lanes value;
-      std::memcpy(&weight, weights, sizeof weight);
-      std::memcpy(&value, values + rows[row] + x, sizeof value);
-      sums += weight * value;
-    }
-  }
-  float sum = 0;
-  for (int lane = 0; lane < kLanes; ++lane) {
-    sum += sums[lane];
-  }
-  return sum;
-}
-
-}  // namespace
 
 void CellWeights::Means(const RateFrame& frame,
                         std::int64_t first,
                         std::span<float> means,
                         std::span<float> variances) const {
   for (std::size_t k = 0; k < means.size(); ++k) {
-    const Box& box = pixels_.boxes[static_cast<std::size_t>(first) + k];
-    float results[2] = {0.0F, -1.0F};
-    if (box.row_count > 0) {
-      SumBox(&pixels_.rows[box.first_row],
-             &pixels_.weights[box.first_weight],
-             {box.row_count, box.row_width},
-             frame,
-             results);
-    }
-    means[k] = results[0];
-    variances[k] = results[1];
+    const PixelBoxes::Value sum =
+        pixels_.Sum(static_cast<std::size_t>(first) + k, frame);
+    means[k] = sum.mean;
+    variances[k] = sum.variance;
   }
 }
 
 void CellWeights::MeansOfBins(const BinnedPicture& picture,
                               std::span<float> means) const {
   for (std::size_t k = 0; k < means.size(); ++k) {
-    const Box& box = bins_.boxes[k];
-    means[k] = box.row_count == 0 ? 0.0F
-                                  : SumBins(&bins_.rows[box.first_row],
-                                            &bins_.weights[box.first_weight],
-                                            {box.row_count, box.row_width},
-                                            picture.values.data());
+    means[k] = bins_.Sum(k, picture.values);
   }
 }
 

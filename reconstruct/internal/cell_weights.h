@@ -3,6 +3,7 @@
 #include "calibrate/calibration.h"
 #include "reconstruct/internal/glare_pyramid.h"
 #include "reconstruct/internal/hdr_merge.h"
+#include "reconstruct/internal/pixel_boxes.h"
 #include "reconstruct/internal/pixel_cells.h"
 #include "reconstruct/rd_dataset.h"
 
@@ -57,30 +58,11 @@ class CellWeights {
   std::size_t MemoryBytes() const { return pixels_.Bytes() + bins_.Bytes(); }
 
  private:
-  // A cell's weights are a box of pixels, each row padded to whole vectors.
-  struct Box {
-    std::size_t first_row = 0;     // in `rows`
-    std::size_t first_weight = 0;  // in `weights`
-    int row_count = 0;             // 0: the camera doesn't see all of the cell
-    int row_width = 0;
-  };
-  struct Boxes {
-    std::vector<Box> boxes;
-    std::vector<std::uint32_t> rows;  // the first pixel of each row of each box
-    std::vector<float> weights;
-
-    void Append(const Boxes& others);
-    std::size_t Bytes() const {
-      return boxes.size() * sizeof(Box) + rows.size() * sizeof(rows[0]) +
-             weights.size() * sizeof(float);
-    }
-  };
-  struct Row;        // of one cell, as it is added to Boxes
   class BoxBuilder;  // the boxes of some rows of cells
 
   CellLattice lattice_;
-  Boxes pixels_;
-  Boxes bins_;  // the same weights, added up in bins
+  PixelBoxes pixels_;
+  PixelBoxes bins_;  // the same weights, added up in bins
 };
 
 }  // namespace nacre::reconstruct::internal

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <span>
 
 namespace nacre::reconstruct::internal {
 namespace {
@@ -57,28 +58,52 @@ std::vector<double> FitRadii(double hole_px, double reach_px) {
   return radii;
 }
 
-constexpr int kBlock = 2 * kLanes;
+// out[x] = Σ_t taps[t] · in[x + t · step] for `kVectors` vectors from x on; taps are
+// symmetric. So many sums side by side needn't wait for one another.
+template <std::size_t kVectors>
+[[gnu::always_inline]] inline void SumTaps(const float* __restrict in,
+                                           std::size_t step,
+                                           std::span<const float> taps,
+                                           float* __restrict out) {
+  using Vectors = Lanes[kVectors];
+  const std::size_t last = taps.size() - 1;
+  Vectors sum;
+  std::memcpy(&sum, in + last / 2 * step, sizeof sum);
+  for (Lanes& lanes : sum) {
+    lanes *= taps[last / 2];
+  }
+  for (std::size_t t = 0; t < last / 2; ++t) {
+    Vectors one;
+    Vectors other;
+    std::memcpy(&one, in + t * step, sizeof one);
+    std::memcpy(&other, in + (last - t) * step, sizeof other);
+    for (std::size_t v = 0; v < kVectors; ++v) {
+      sum[v] += taps[t] * (one[v] + other[v]);
+    }
+  }
+  std::memcpy(out, &sum, sizeof sum);
+}
 
-// out[x] += Σ_t taps[t] · in[x + t · step], a multiple of kBlock values.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddTaps(
+// The same of a multiple of kLanes values.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void ApplyTaps(
     const float* __restrict in,
     std::size_t step,
-    const std::vector<float>& taps,
+    std::span<const float> taps,
     std::size_t count,
     float* __restrict out) {
-  for (std::size_t x = 0; x < count; x += kBlock) {
-    Lanes sum[2] = {};
-    for (std::size_t t = 0; t < taps.size(); ++t) {
-      Lanes values[2];
-      std::memcpy(values, in + x + t * step, sizeof values);
-      sum[0] += taps[t] * values[0];
-      sum[1] += taps[t] * values[1];
-    }
-    Lanes before[2];
-    std::memcpy(before, out + x, sizeof before);
-    sum[0] += before[0];
-    sum[1] += before[1];
-    std::memcpy(out + x, sum, sizeof sum);
+  std::size_t x = 0;
+  for (; x + 4 * kLanes <= count; x += 4 * kLanes) {
+    SumTaps<4>(in + x, step, taps, out + x);
+  }
+  for (; x < count; x += kLanes) {
+    SumTaps<1>(in + x, step, taps, out + x);
+  }
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
+    const float* __restrict in, float scale, std::size_t count, float* __restrict out) {
+  for (std::size_t x = 0; x < count; ++x) {
+    out[x] += scale * in[x];
   }
 }
 
@@ -108,65 +133,93 @@ void Halve(const float* in, int width, int height, BinnedPicture& out) {
   }
 }
 
+// out[x], x from 1 to count − 2, of a line of 2 · count values: each shared between the
+// two nearest bins.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void ShareLine(
+    const float* __restrict in, std::size_t count, float* __restrict out) {
+  for (std::size_t x = 1; x + 1 < count; ++x) {
+    out[x] =
+        0.75F * (in[2 * x] + in[2 * x + 1]) + 0.25F * (in[2 * x - 1] + in[2 * x + 2]);
+  }
+}
+
+// The other way round: two values of a line for each of coarse ones, from 1 on.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void AddGrownLine(
+    const float* __restrict own,
+    const float* __restrict other,
+    std::size_t count,
+    float* __restrict line,
+    float* __restrict out) {
+  for (std::size_t x = 0; x < count; ++x) {
+    line[x] = 0.75F * own[x] + 0.25F * other[x];
+  }
+  for (std::size_t x = 1; x + 1 < count; ++x) {
+    out[2 * x] += 0.75F * line[x] + 0.25F * line[x - 1];
+    out[2 * x + 1] += 0.75F * line[x] + 0.25F * line[x + 1];
+  }
+}
+
 // coarse = fine, each value shared between the two nearest bins along each axis so that
 // the light's place is kept, not only its sum; beyond the rim is the rim. A box would
 // move light by half a bin.
 void Shrink(const BinnedPicture& fine, BinnedPicture& coarse) {
   const auto width = static_cast<std::size_t>(fine.width);
-  const std::size_t half = width / 2;
-  std::vector<float> row(static_cast<std::size_t>(coarse.width));
-  const std::size_t last = row.size() - 1;
+  const auto count = static_cast<std::size_t>(coarse.width);
+  std::vector<float> row(count);
+  const auto at = [&](const float* in, std::ptrdiff_t x) {
+    const auto last = static_cast<std::ptrdiff_t>(width) - 1;
+    return x > last ? 0.0F : in[std::max<std::ptrdiff_t>(0, x)];
+  };
+  // The bins at the ends: what would go beyond them stays.
+  const auto share_end = [&](const float* in, std::size_t x) {
+    const auto first = static_cast<std::ptrdiff_t>(2 * x);
+    const float before = x == 0 ? in[0] : at(in, first - 1);
+    const bool is_last = width % 2 == 0 && x + 1 == count;
+    const float after = is_last ? in[width - 1] : at(in, first + 2);
+    row[x] = 0.75F * (at(in, first) + at(in, first + 1)) + 0.25F * (before + after);
+  };
   std::fill(coarse.values.begin(), coarse.values.end(), 0.0F);
   for (int y = 0; y < fine.height; ++y) {
     const float* in = &fine.values[static_cast<std::size_t>(y) * width];
-    for (std::size_t x = 0; x < half; ++x) {
-      row[x] = 0.75F * (in[2 * x] + in[2 * x + 1]);
-    }
-    if (width % 2 != 0) {
-      row[last] = 0.75F * in[width - 1];
-    }
-    for (std::size_t x = 1; x < half; ++x) {
-      row[x] += 0.25F * in[2 * x - 1];
-      row[x - 1] += 0.25F * in[2 * x];
-    }
-    row[0] += 0.25F * in[0];
-    if (width % 2 != 0) {
-      row[last] += half > 0 ? 0.25F * in[width - 2] : 0.0F;
-      row[half > 0 ? last - 1 : 0] += 0.25F * in[width - 1];
-    } else {
-      row[last] += 0.25F * in[width - 1];
-    }
+    ShareLine(in, width / 2, row.data());
+    share_end(in, 0);
+    share_end(in, width / 2 - (width > 1 ? 1 : 0));
+    share_end(in, count - 1);
     const int beside = std::clamp(y / 2 + (y % 2 == 0 ? -1 : 1), 0, coarse.height - 1);
-    float* own = &coarse.values[static_cast<std::size_t>(y / 2) * row.size()];
-    float* other = &coarse.values[static_cast<std::size_t>(beside) * row.size()];
-    for (std::size_t x = 0; x < row.size(); ++x) {
-      own[x] += 0.75F * row[x];
-    }
-    for (std::size_t x = 0; x < row.size(); ++x) {
-      other[x] += 0.25F * row[x];
-    }
+    AddScaled(row.data(),
+              0.75F,
+              count,
+              &coarse.values[static_cast<std::size_t>(y / 2) * count]);
+    AddScaled(row.data(),
+              0.25F,
+              count,
+              &coarse.values[static_cast<std::size_t>(beside) * count]);
   }
 }
 
 // fine += coarse, by the tent between the centres of its bins; constant beyond the rim.
 void AddGrown(const BinnedPicture& coarse, BinnedPicture& fine) {
   const auto width = static_cast<std::size_t>(fine.width);
-  std::vector<float> row(static_cast<std::size_t>(coarse.width));
-  const std::size_t last = row.size() - 1;
+  const auto count = static_cast<std::size_t>(coarse.width);
+  std::vector<float> row(count);
+  const std::size_t last = count - 1;
   for (int y = 0; y < fine.height; ++y) {
     const int beside = std::clamp(y / 2 + (y % 2 == 0 ? -1 : 1), 0, coarse.height - 1);
-    const float* own = &coarse.values[static_cast<std::size_t>(y / 2) * row.size()];
-    const float* other = &coarse.values[static_cast<std::size_t>(beside) * row.size()];
-    for (std::size_t x = 0; x < row.size(); ++x) {
-      row[x] = 0.75F * own[x] + 0.25F * other[x];
-    }
     float* out = &fine.values[static_cast<std::size_t>(y) * width];
-    for (std::size_t x = 0; x < width / 2; ++x) {
+    AddGrownLine(&coarse.values[static_cast<std::size_t>(y / 2) * count],
+                 &coarse.values[static_cast<std::size_t>(beside) * count],
+                 count,
+                 row.data(),
+                 out);
+    const auto add_end = [&](std::size_t x) {
       out[2 * x] += 0.75F * row[x] + 0.25F * row[x > 0 ? x - 1 : 0];
-      out[2 * x + 1] += 0.75F * row[x] + 0.25F * row[x < last ? x + 1 : last];
-    }
-    if (width % 2 != 0) {
-      out[width - 1] += 0.75F * row[last] + 0.25F * row[last > 0 ? last - 1 : 0];
+      if (2 * x + 1 < width) {
+        out[2 * x + 1] += 0.75F * row[x] + 0.25F * row[x < last ? x + 1 : last];
+      }
+    };
+    add_end(0);
+    if (last > 0) {
+      add_end(last);
     }
   }
 }
@@ -276,8 +329,9 @@ void GlarePyramid::Convolve(int level,
                             BinnedPicture& result) const {
   const auto width = static_cast<std::size_t>(sums.width);
   const auto height = static_cast<std::size_t>(sums.height);
-  const std::size_t stride = (width + kBlock - 1) / kBlock * kBlock;
+  const std::size_t stride = (width + kLanes - 1) / kLanes * kLanes;
   std::fill(result.values.begin(), result.values.end(), 0.0F);
+  std::vector<float> row(stride);
   for (const Gaussian& gaussian : gaussians_) {
     if (gaussian.level != level) {
       continue;
@@ -285,19 +339,15 @@ void GlarePyramid::Convolve(int level,
     const std::size_t radius = gaussian.taps.size() / 2;
     // Rows with dark ones above and below.
     std::vector<float> along((height + 2 * radius) * stride, 0.0F);
-    std::vector<float> line(stride + 2 * radius + kBlock, 0.0F);
+    std::vector<float> line(stride + 2 * radius, 0.0F);
     for (std::size_t y = 0; y < height; ++y) {
       std::copy_n(&sums.values[y * width], width, &line[radius]);
-      AddTaps(line.data(), 1, gaussian.taps, stride, &along[(y + radius) * stride]);
+      ApplyTaps(line.data(), 1, gaussian.taps, stride, &along[(y + radius) * stride]);
     }
     const auto scale = static_cast<float>(gaussian.weight / std::pow(SideAt(level), 2));
-    std::vector<float> row(stride);
     for (std::size_t y = 0; y < height; ++y) {
-      std::fill(row.begin(), row.end(), 0.0F);
-      AddTaps(&along[y * stride], stride, gaussian.taps, stride, row.data());
-      for (std::size_t x = 0; x < width; ++x) {
-        result.values[y * width + x] += scale * row[x];
-      }
+      ApplyTaps(&along[y * stride], stride, gaussian.taps, stride, row.data());
+      AddScaled(row.data(), scale, width, &result.values[y * width]);
     }
   }
 }
@@ -322,12 +372,11 @@ BinnedPicture WithRim(const BinnedPicture& picture) {
 
 void AddWithoutRim(const BinnedPicture& padded, BinnedPicture& picture) {
   for (int y = 0; y < picture.height; ++y) {
-    const float* from =
-        &padded.values[static_cast<std::size_t>((y + kRim) * padded.width + kRim)];
-    float* to = &picture.values[static_cast<std::size_t>(y * picture.width)];
-    for (int x = 0; x < picture.width; ++x) {
-      to[x] += from[x];
-    }
+    AddScaled(
+        &padded.values[static_cast<std::size_t>((y + kRim) * padded.width + kRim)],
+        1,
+        static_cast<std::size_t>(picture.width),
+        &picture.values[static_cast<std::size_t>(y * picture.width)]);
   }
 }
 

@@ -35,26 +35,6 @@ Corners CornersAbove(const CellLattice& lattice,
   return corners;
 }
 
-// Whether the corners above a pixel row may lie in the band, or between two such rows
-// that do: by some of them, which bend little in between.
-bool MayTouch(const CellLattice& lattice,
-              const calibrate::CameraGeometry& camera,
-              const PlaceOnLattice& place,
-              RowBand band,
-              int row) {
-  constexpr int kPlaces = 8;
-  constexpr double kMarginCells = 1;
-  double least = 1e30;
-  double most = -1e30;
-  for (int k = 0; k <= kPlaces; ++k) {
-    const double x = -0.5 + static_cast<double>(k) * camera.width_px / kPlaces;
-    const double y = CornerAt(lattice, camera, place, {x, row - 0.5}).y;
-    least = std::min(least, y);
-    most = std::max(most, y);
-  }
-  return most > band.begin - kMarginCells && least < band.end + kMarginCells;
-}
-
 // A pixel's corners, clockwise as seen in the picture, and the inverse of the linear
 // map from pixel to cell coordinates.
 struct Pixel {
@@ -170,22 +150,44 @@ PointMm CellLattice::Centre(int column, int row) const {
           corner_mm.y - (row + 0.5) * pitch_mm};
 }
 
-std::vector<PixelPiece> CutPixels(const CellLattice& lattice,
-                                  const calibrate::CameraGeometry& camera,
-                                  const PlaceOnLattice& place,
-                                  RowBand band) {
+// By some places of each line of corners, which bend little in between.
+PixelCutter::PixelCutter(const CellLattice& lattice,
+                         const calibrate::CameraGeometry& camera,
+                         const PlaceOnLattice& place)
+    : lattice_(lattice), camera_(camera), place_(place) {
+  constexpr int kPlaces = 8;
+  for (int row = 0; row <= camera.height_px; ++row) {
+    Extent& extent = extents_.emplace_back();
+    for (int k = 0; k <= kPlaces; ++k) {
+      const double x = -0.5 + static_cast<double>(k) * camera.width_px / kPlaces;
+      const double y = CornerAt(lattice, camera, place, {x, row - 0.5}).y;
+      extent.least = std::min(extent.least, y);
+      extent.most = std::max(extent.most, y);
+    }
+  }
+}
+
+// Whether the corners above a pixel row may lie in the band, or between two such rows
+// that do.
+bool PixelCutter::MayTouch(RowBand band, int row) const {
+  constexpr double kMarginCells = 1;
+  const Extent& extent = extents_[static_cast<std::size_t>(row)];
+  return extent.most > band.begin - kMarginCells &&
+         extent.least < band.end + kMarginCells;
+}
+
+std::vector<PixelPiece> PixelCutter::Cut(RowBand band) const {
   std::vector<PixelPiece> pieces;
   Corners above;
   bool was_near = false;
-  for (int row = 0; row < camera.height_px; ++row) {
-    const bool is_near = MayTouch(lattice, camera, place, band, row) ||
-                         MayTouch(lattice, camera, place, band, row + 1);
+  for (int row = 0; row < camera_.height_px; ++row) {
+    const bool is_near = MayTouch(band, row) || MayTouch(band, row + 1);
     if (is_near) {
       if (!was_near) {
-        above = CornersAbove(lattice, camera, place, row);
+        above = CornersAbove(lattice_, camera_, place_, row);
       }
-      Corners below = CornersAbove(lattice, camera, place, row + 1);
-      CutRow(lattice, band, {row, above, below}, pieces);
+      Corners below = CornersAbove(lattice_, camera_, place_, row + 1);
+      CutRow(lattice_, band, {row, above, below}, pieces);
       above = std::move(below);
     }
     was_near = is_near;

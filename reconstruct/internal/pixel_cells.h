@@ -47,11 +47,29 @@ struct RowBand {
   int end;
 };
 
-/// All pieces of cells in `band`, sorted by pixels. Pixels cover quadrilaterals of the
-/// sample plane.
-std::vector<PixelPiece> CutPixels(const CellLattice& lattice,
-                                  const calibrate::CameraGeometry& camera,
-                                  const PlaceOnLattice& place,
-                                  RowBand band);
+/// Cuts a camera's pixels, quadrilaterals of the sample plane, along the lattice.
+class PixelCutter {
+ public:
+  /// All arguments must outlive this.
+  PixelCutter(const CellLattice& lattice,
+              const calibrate::CameraGeometry& camera,
+              const PlaceOnLattice& place);
+
+  /// All pieces of cells in `band`, sorted by pixels.
+  std::vector<PixelPiece> Cut(RowBand band) const;
+
+ private:
+  // Where the corners above a row of pixels lie, in rows of cells.
+  struct Extent {
+    double least = 1e30;
+    double most = -1e30;
+  };
+  bool MayTouch(RowBand band, int row) const;
+
+  const CellLattice& lattice_;
+  const calibrate::CameraGeometry& camera_;
+  const PlaceOnLattice& place_;
+  std::vector<Extent> extents_;
+};
 
 }  // namespace nacre::reconstruct::internal

@@ -23,14 +23,6 @@ struct CellValues {
   std::span<float> glare;
 };
 
-/// Where the surface lies, and the beams on it.
-struct SurfaceModel {
-  calibrate::SpotProfile spot;  ///< whose blur is undone
-  PlaceOnLattice place;         ///< see PixelModel
-  PlaceOnLattice on_surface;    ///< see WindowShift
-  std::vector<PointMm> beam_offsets;
-};
-
 /// From the pixels of one plane to cells: the whole picture of a monochrome sensor, a
 /// quarter of a mosaic's (calibrate/mosaic.h), which is a picture by itself.
 class PlaneReader {

@@ -3,6 +3,7 @@
 #include "reconstruct/internal/hdr_merge.h"
 
 #include "core/random.h"
+#include "reconstruct/internal/merge_kernels.h"
 
 #include <gtest/gtest.h>
 
@@ -90,6 +91,48 @@ TEST(MergeExposures, WhatSaturatesInAllIsMarked) {
   const RateFrame merged = MergeExposures(frames, Calibration());
   EXPECT_EQ(merged.saturated_count, 1500);
   EXPECT_LT(merged.variance[1400], 0.0F);
+}
+
+// The fast way against the plain one, over all that a pixel can be: dark, cut off by
+// saturation in any exposure, and a number of pixels that fills no vector.
+TEST(MergeFew, IsMergeMany) {
+  constexpr std::size_t kPixels = 5003;
+  const std::vector<float> exposures_us = {100, 1000, 8000, 40000};
+  const Noise noise{0.2F, 4090, 1e-6F, 1e-10F};
+  RandomStream random(5, 0);
+  std::vector<std::vector<std::uint16_t>> counts(exposures_us.size());
+  for (std::size_t k = 0; k < kPixels; ++k) {
+    const double rate = std::pow(10.0, 5 * random.Uniform() - 3);
+    for (std::size_t b = 0; b < counts.size(); ++b) {
+      const double mean = 60 + rate * static_cast<double>(exposures_us[b]);
+      const double seen = mean + std::sqrt(0.2 * mean + 2) * Normal(random);
+      counts[b].push_back(static_cast<std::uint16_t>(std::clamp(seen, 0.0, 4095.0)));
+    }
+  }
+  for (std::size_t count = 1; count <= kFewExposures; ++count) {
+    std::vector<Bracket> brackets;
+    float shorter_us = 0;
+    for (std::size_t b = 0; b < count; ++b) {
+      const float order = static_cast<float>(b);
+      brackets.push_back(
+          {counts[b].data(), exposures_us[b], 60.0F, shorter_us, order, 2.0F, 4030.0F});
+      shorter_us += exposures_us[b];
+    }
+    RateFrame few{std::vector<float>(kPixels), std::vector<float>(kPixels)};
+    RateFrame many = few;
+    MergeFew(brackets, noise, few);
+    MergeMany(brackets, noise, many);
+    EXPECT_GT(many.saturated_count, 0);
+    EXPECT_EQ(few.saturated_count, many.saturated_count);
+    for (std::size_t k = 0; k < kPixels; ++k) {
+      const float noise_there = std::sqrt(std::max(0.0F, many.variance[k]));
+      ASSERT_NEAR(few.rate[k],
+                  many.rate[k],
+                  1e-4F * noise_there + 2e-6F * std::abs(many.rate[k]));
+      ASSERT_NEAR(few.variance[k], many.variance[k], 2e-5F * std::abs(many.variance[k]))
+          << k;
+    }
+  }
 }
 
 }  // namespace
