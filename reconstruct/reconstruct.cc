@@ -7,16 +7,12 @@
 #include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
-#include "reconstruct/internal/exposure_advice.h"
-#include "reconstruct/internal/fill_diagonal.h"
-#include "reconstruct/internal/glare_floor.h"
 #include "reconstruct/internal/gloss.h"
 #include "reconstruct/internal/group_reader.h"
 #include "reconstruct/internal/group_spool.h"
 #include "reconstruct/internal/separation.h"
 #include "reconstruct/internal/spot_width.h"
-#include "reconstruct/internal/symmetrize.h"
-#include "reconstruct/internal/systematics.h"
+#include "reconstruct/internal/write_slices.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <algorithm>
@@ -207,74 +203,6 @@ void Measure(const GroupReader& reader,
   }
 }
 
-// What is done to a slice once its spots are apart.
-struct Finishing {
-  const calibrate::Calibration& calibration;
-  const internal::GlossRemover& gloss;
-  const internal::ExposureAdvice& advice;
-  double longest_us;
-};
-
-// Pass 2: slices, freed of each other's light, in the order of the file.
-void WriteSlices(const Finishing& finishing,
-                 const ReconstructOptions& options,
-                 const RdHeader& header,
-                 const Separation& separation,
-                 RdWriter& writer,
-                 ReconstructSummary& summary,
-                 const ProgressFunction& progress) {
-  const auto width = static_cast<std::size_t>(header.points_x);
-  internal::SymmetrizeChange change;
-  internal::ExposureAdvice::Counts dim;
-  for (int j = 0; j < header.points_y; ++j) {
-    Report(progress, {"reconstruct", j, header.points_y, "slices"});
-    constexpr std::size_t kSlicesAtOnce = 64;
-    for (std::size_t first = 0; first < width; first += kSlicesAtOnce) {
-      const std::size_t count = std::min(kSlicesAtOnce, width - first);
-      std::vector<RdSlice> slices(count);
-      std::vector<double> shares(count, 0.0);
-      std::vector<internal::SymmetrizeChange> changes(count);
-      std::vector<std::int64_t> below(count, 0);
-      std::vector<internal::ExposureAdvice::Counts> dims(count);
-      ParallelFor(std::ssize(slices), options.thread_count, [&](std::int64_t n) {
-        const auto k = static_cast<std::size_t>(n);
-        const std::int64_t s =
-            std::int64_t{j} * header.points_x + static_cast<std::int64_t>(first + k);
-        slices[k] = separation.Slice(s, &shares[k]);
-        if (options.symmetrize) {
-          changes[k] = internal::Symmetrize(header, separation, s, slices[k]);
-        }
-        // First: what scales a slice, as its power's ripple does, scales gloss as well.
-        if (options.state_systematics) {
-          internal::AddSystematics(
-              header, finishing.calibration, finishing.longest_us, slices[k]);
-        }
-        finishing.gloss.Remove(s, slices[k]);
-        if (options.specular_radius_cells >= 0) {
-          internal::FillDiagonal(header, options.specular_radius_cells, slices[k]);
-        }
-        below[k] = internal::MarkBelowFloor(header, separation.Floor(s), slices[k]);
-        dims[k] = finishing.advice.Look(slices[k]);
-      });
-      for (std::size_t k = 0; k < count; ++k) {
-        writer.WriteSlice(static_cast<int>(first + k), j, slices[k]);
-        summary.max_crosstalk = std::max(summary.max_crosstalk, shares[k]);
-        summary.invalid_count +=
-            std::count(slices[k].valid.begin(), slices[k].valid.end(), 0);
-        summary.below_floor_count += below[k];
-        change.Add(changes[k]);
-        dim.Add(dims[k]);
-      }
-    }
-  }
-  if (std::string text = finishing.advice.Warning(dim); !text.empty()) {
-    summary.warnings.push_back(std::move(text));
-  }
-  summary.symmetrize_change = change.Share();
-  summary.symmetrize_worst_total = change.worst_total;
-  Report(progress, {"reconstruct", header.points_y, header.points_y, "slices"});
-}
-
 }  // namespace
 
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
@@ -338,12 +266,13 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   const internal::GlossRemover remover(gloss, calibration, state.plane, header, reader);
   const auto& exposures_us = session.rig().camera.exposures_us;
   const internal::ExposureAdvice advice(calibration, header, exposures_us);
-  const Finishing finishing{
+  const internal::Finishing finishing{
+      header,
       calibration,
       remover,
       advice,
       *std::max_element(exposures_us.begin(), exposures_us.end())};
-  WriteSlices(finishing, options, header, separation, writer, summary, progress);
+  internal::WriteSlices(separation, finishing, options, writer, summary, progress);
   if (summary.below_floor_count > 0) {
     summary.warnings.push_back(fmt::format(
         "glare-floor: {} of {} values are below what glare leaves uncertain "

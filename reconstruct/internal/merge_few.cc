@@ -7,23 +7,32 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
+// Pixels whose counts are made floats at a time: 2 kB an exposure.
+constexpr std::size_t kBlock = 512;
+using Block = std::array<float, kBlock>;
+
+struct Result {
+  float* rate;
+  float* variance;
+};
+
 // What is done a pixel is said in MergeMany. `kCount` is known to the compiler, so that
 // loops over exposures are unrolled and that over pixels is made of vectors; conditions
 // are 0 and 1, which it makes masks of. Divisions are what takes long: one does for all
 // weights, which are brought to one denominator.
 template <std::size_t kCount>
-[[gnu::always_inline]] inline void MergeOf(std::span<const Bracket> brackets,
+[[gnu::always_inline]] inline void MergeOf(const Bracket* brackets,
+                                           const Block* counts,
                                            Noise noise,
-                                           std::span<float> rates,
-                                           std::span<float> variances) {
+                                           std::size_t pixels,
+                                           Result result) {
   constexpr float kMargin2 = kMarginSigmas * kMarginSigmas;
   constexpr float kTiny = 1e-30F;  // in place of 0, where a pixel has no exposure
   std::array<Bracket, kCount> all;
-  std::copy_n(brackets.begin(), kCount, all.begin());
+  std::copy_n(brackets, kCount, all.begin());
   const float longest_us = all[kCount - 1].exposure_us;
-  float* __restrict rate_out = rates.data();
-  float* __restrict variance_out = variances.data();
-  const std::size_t pixels = rates.size();
+  float* __restrict rate_out = result.rate;
+  float* __restrict variance_out = result.variance;
   for (std::size_t k = 0; k < pixels; ++k) {
     float signal = 0;
     float pooled_variance = 0;
@@ -33,7 +42,7 @@ template <std::size_t kCount>
     float uses[kCount];
     for (std::size_t b = 0; b < kCount; ++b) {
       const float ratio = all[b].Ratio();
-      const auto raw = static_cast<float>(all[b].counts[k]);
+      const float raw = counts[b][k];
       above[b] = noise.Linear(raw - all[b].dark_counts);
       const float expected = std::max(0.0F, signal) * ratio;
       const float variance =
@@ -58,7 +67,7 @@ template <std::size_t kCount>
       const float t = all[b].exposure_us;
       const float expected = pooled * t;
       const float d = (expected * noise.slope + all[b].floor) * noise.Stretch(expected);
-      const float n = uses[b] * (t / longest_us) * (t / longest_us) * product;
+      const float n = uses[b] * ((t / longest_us) * (t / longest_us)) * product;
       weights = weights * d + n;
       weighted = weighted * d + n * (above[b] * (1 / t));
       product *= d;
@@ -71,35 +80,48 @@ template <std::size_t kCount>
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeOne(
-    std::span<const Bracket> brackets,
+    const Bracket* brackets,
+    const Block* counts,
     Noise noise,
-    std::span<float> rates,
-    std::span<float> variances) {
-  MergeOf<1>(brackets, noise, rates, variances);
+    std::size_t pixels,
+    Result result) {
+  MergeOf<1>(brackets, counts, noise, pixels, result);
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeTwo(
-    std::span<const Bracket> brackets,
+    const Bracket* brackets,
+    const Block* counts,
     Noise noise,
-    std::span<float> rates,
-    std::span<float> variances) {
-  MergeOf<2>(brackets, noise, rates, variances);
+    std::size_t pixels,
+    Result result) {
+  MergeOf<2>(brackets, counts, noise, pixels, result);
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeThree(
-    std::span<const Bracket> brackets,
+    const Bracket* brackets,
+    const Block* counts,
     Noise noise,
-    std::span<float> rates,
-    std::span<float> variances) {
-  MergeOf<3>(brackets, noise, rates, variances);
+    std::size_t pixels,
+    Result result) {
+  MergeOf<3>(brackets, counts, noise, pixels, result);
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeFour(
-    std::span<const Bracket> brackets,
+    const Bracket* brackets,
+    const Block* counts,
     Noise noise,
-    std::span<float> rates,
-    std::span<float> variances) {
-  MergeOf<4>(brackets, noise, rates, variances);
+    std::size_t pixels,
+    Result result) {
+  MergeOf<4>(brackets, counts, noise, pixels, result);
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void ToFloats(
+    const std::uint16_t* __restrict counts,
+    std::size_t count,
+    float* __restrict floats) {
+  for (std::size_t k = 0; k < count; ++k) {
+    floats[k] = static_cast<float>(counts[k]);
+  }
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) std::int64_t CountBelow0(
@@ -116,7 +138,19 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) std::int64_t CountB
 void MergeFew(std::span<const Bracket> brackets, Noise noise, RateFrame& merged) {
   Expect(!brackets.empty() && brackets.size() <= kFewExposures, "a few exposures");
   constexpr std::array kMerge = {MergeOne, MergeTwo, MergeThree, MergeFour};
-  kMerge[brackets.size() - 1](brackets, noise, merged.rate, merged.variance);
+  const std::size_t pixels = merged.rate.size();
+  std::array<Block, kFewExposures> counts;
+  for (std::size_t begin = 0; begin < pixels; begin += kBlock) {
+    const std::size_t count = std::min(kBlock, pixels - begin);
+    for (std::size_t b = 0; b < brackets.size(); ++b) {
+      ToFloats(brackets[b].counts + begin, count, counts[b].data());
+    }
+    kMerge[brackets.size() - 1](brackets.data(),
+                                counts.data(),
+                                noise,
+                                count,
+                                {&merged.rate[begin], &merged.variance[begin]});
+  }
   merged.saturated_count = CountBelow0(merged.variance);
 }
 
