@@ -145,6 +145,9 @@ SessionManifest ReadManifest(const std::filesystem::path& folder) {
     manifest.adaptive_plan =
         PlanFromJson(json["adaptive_plan"], origin + ": adaptive_plan");
   }
+  if (json.contains("captured_unix_s")) {
+    manifest.captured_unix_s = Get<std::int64_t>(json, "captured_unix_s", origin);
+  }
   return manifest;
 }
 
@@ -167,6 +170,9 @@ void WriteManifest(const std::filesystem::path& folder,
             {"scan_map", manifest.scan_map ? ToJson(*manifest.scan_map) : Json()}};
   if (manifest.adaptive_plan) {
     json["adaptive_plan"] = ToJson(*manifest.adaptive_plan);
+  }
+  if (manifest.captured_unix_s) {
+    json["captured_unix_s"] = *manifest.captured_unix_s;
   }
   WriteJson(folder / "session.json", json);
 }

@@ -30,6 +30,9 @@ struct SessionManifest {
   /// Of an adaptive capture, once the preview of the sample is taken.
   std::optional<AdaptivePlan> adaptive_plan = std::nullopt;
   std::string software_version;  ///< that began the session
+  /// When it was begun, seconds of Unix time; a simulated session is of no time, so
+  /// that the same rig gives the same bytes.
+  std::optional<std::int64_t> captured_unix_s = std::nullopt;
 };
 
 /// session.json of a folder. Throws BadData for anything missing or contradictory.

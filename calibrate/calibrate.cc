@@ -224,6 +224,7 @@ Calibration Calibrate(const acquire::SessionReader& session,
                   .pitch_mm = session.rig().grid.pitch_mm,
                   .longest_exposure_us = session.rig().camera.exposures_us.front()});
   calibration.session_rig_hash = session.manifest().rig_hash;
+  calibration.captured_unix_s = session.manifest().captured_unix_s;
   calibration.provenance =
       Provenance{.command = "calibrate",
                  .options = OptionsToJson(options),

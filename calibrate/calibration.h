@@ -4,7 +4,9 @@
 #include "calibrate/corrections.h"
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -104,7 +106,9 @@ struct Calibration {
   Corrections corrections;
   Diagnostics diagnostics;
   std::string session_rig_hash;  ///< of the rig description it was made for
-  std::string provenance;        ///< JSON text, see core/provenance.h
+  /// When its session was captured, if that is known (acquire::SessionManifest).
+  std::optional<std::int64_t> captured_unix_s = std::nullopt;
+  std::string provenance;  ///< JSON text, see core/provenance.h
 
   /// The cosine of the beam's angle of incidence; the scanner's axis is taken to be
   /// normal to the sample, as the rig's assembly demands.

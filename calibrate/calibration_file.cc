@@ -147,37 +147,39 @@ void WriteCalibration(const std::filesystem::path& path,
   for (const ChannelResponse& channel : calibration.channels) {
     channels.push_back(ToJson(channel));
   }
-  WriteJson(
-      path,
-      Json{{"format", kFormat},
-           {"format_version", kFormatVersion},
-           {"session_rig_xxh3", calibration.session_rig_hash},
-           {"camera", ToJson(calibration.camera)},
-           {"reprojection_rms_px", calibration.reprojection_rms_px},
-           {"dark_offset_counts", calibration.dark.offset_counts},
-           {"dark_offset_sigma_counts", calibration.dark.offset_sigma_counts},
-           {"dark_rate_counts_per_us", calibration.dark.rate_counts_per_us},
-           {"dark_rate_sigma_counts_per_us", calibration.dark.rate_sigma_counts_per_us},
-           {"gain_electrons_per_count", calibration.gain_electrons_per_count},
-           {"read_noise_electrons", calibration.read_noise_electrons},
-           {"gain_sigma_electrons_per_count",
-            calibration.gain_sigma_electrons_per_count},
-           {"read_noise_sigma_electrons", calibration.read_noise_sigma_electrons},
-           {"focal_sigma_px", calibration.focal_sigma_px},
-           {"centre_sigma_px", calibration.centre_sigma_px},
-           {"height_sigma_mm", calibration.height_sigma_mm},
-           {"saturation_counts", calibration.saturation_counts},
-           {"channels", channels},
-           {"scan_map", acquire::ToJson(calibration.scan_map)},
-           {"laser_map_rms_mm", calibration.laser_map_rms_mm},
-           {"laser_map_max_mm", calibration.laser_map_max_mm},
-           {"laser_map_held_out_rms_mm", calibration.laser_map_held_out_rms_mm},
-           {"corrections", internal::ToJson(calibration.corrections)},
-           {"diagnostics",
-            {{"corners_px", calibration.diagnostics.corners_px},
-             {"spots_mm", calibration.diagnostics.spots_mm},
-             {"response", calibration.diagnostics.response}}},
-           {"provenance", ParseJson(calibration.provenance, path.string())}});
+  Json json{
+      {"format", kFormat},
+      {"format_version", kFormatVersion},
+      {"session_rig_xxh3", calibration.session_rig_hash},
+      {"camera", ToJson(calibration.camera)},
+      {"reprojection_rms_px", calibration.reprojection_rms_px},
+      {"dark_offset_counts", calibration.dark.offset_counts},
+      {"dark_offset_sigma_counts", calibration.dark.offset_sigma_counts},
+      {"dark_rate_counts_per_us", calibration.dark.rate_counts_per_us},
+      {"dark_rate_sigma_counts_per_us", calibration.dark.rate_sigma_counts_per_us},
+      {"gain_electrons_per_count", calibration.gain_electrons_per_count},
+      {"read_noise_electrons", calibration.read_noise_electrons},
+      {"gain_sigma_electrons_per_count", calibration.gain_sigma_electrons_per_count},
+      {"read_noise_sigma_electrons", calibration.read_noise_sigma_electrons},
+      {"focal_sigma_px", calibration.focal_sigma_px},
+      {"centre_sigma_px", calibration.centre_sigma_px},
+      {"height_sigma_mm", calibration.height_sigma_mm},
+      {"saturation_counts", calibration.saturation_counts},
+      {"channels", channels},
+      {"scan_map", acquire::ToJson(calibration.scan_map)},
+      {"laser_map_rms_mm", calibration.laser_map_rms_mm},
+      {"laser_map_max_mm", calibration.laser_map_max_mm},
+      {"laser_map_held_out_rms_mm", calibration.laser_map_held_out_rms_mm},
+      {"corrections", internal::ToJson(calibration.corrections)},
+      {"diagnostics",
+       {{"corners_px", calibration.diagnostics.corners_px},
+        {"spots_mm", calibration.diagnostics.spots_mm},
+        {"response", calibration.diagnostics.response}}},
+      {"provenance", ParseJson(calibration.provenance, path.string())}};
+  if (calibration.captured_unix_s) {
+    json["captured_unix_s"] = *calibration.captured_unix_s;
+  }
+  WriteJson(path, json);
 }
 
 Calibration ReadCalibration(const std::filesystem::path& path) {
@@ -197,6 +199,9 @@ Calibration ReadCalibration(const std::filesystem::path& path) {
   }
   Calibration calibration;
   calibration.session_rig_hash = Get<std::string>(json, "session_rig_xxh3", origin);
+  if (json.contains("captured_unix_s")) {
+    calibration.captured_unix_s = Get<std::int64_t>(json, "captured_unix_s", origin);
+  }
   calibration.camera =
       CameraFromJson(Get<Json>(json, "camera", origin), origin + ": camera");
   calibration.reprojection_rms_px =

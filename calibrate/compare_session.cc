@@ -89,9 +89,32 @@ void CompareFlux(const Calibration& calibration,
 
 }  // namespace
 
+std::vector<Warning> CompareAge(const acquire::SessionReader& session,
+                                const Calibration& calibration,
+                                double max_age_days) {
+  const std::optional<std::int64_t> then = calibration.captured_unix_s;
+  const std::optional<std::int64_t> now = session.manifest().captured_unix_s;
+  if (!then || !now) {
+    return {};
+  }
+  constexpr double kSecondsADay = 86400;
+  const double days = static_cast<double>(*now - *then) / kSecondsADay;
+  if (std::abs(days) <= max_age_days) {
+    return {};
+  }
+  return {{"stale-by-age",
+           fmt::format("the calibration's pictures were taken {:.1f} days {} the "
+                       "session's, more than {:g} apart; check it against the "
+                       "session's own targets (nacre calibrate --check)",
+                       std::abs(days),
+                       days > 0 ? "before" : "after",
+                       max_age_days)}};
+}
+
 std::vector<Warning> CompareWithSession(const acquire::SessionReader& session,
-                                        const Calibration& calibration) {
-  std::vector<Warning> warnings;
+                                        const Calibration& calibration,
+                                        double max_age_days) {
+  std::vector<Warning> warnings = CompareAge(session, calibration, max_age_days);
   const acquire::CameraInfo& camera = session.manifest().camera;
   if (camera.width != calibration.camera.width_px ||
       camera.height != calibration.camera.height_px ||

@@ -41,10 +41,21 @@ PointMm OnSurface(const Calibration& calibration,
                   const SamplePlane& plane,
                   PointMm point);
 
+/// A guess of how long a rig that nobody touches stays as it is.
+constexpr double kMaxAgeDays = 30;
+
 /// Is the calibration of another session still true of this one? Its dark level, the
 /// lattice on the reference (camera and laser) and the flux are compared; a warning for
-/// each that differs by more than both uncertainties and what would matter.
+/// each that differs by more than both uncertainties and what would matter. And
+/// CompareAge.
 std::vector<Warning> CompareWithSession(const acquire::SessionReader& session,
-                                        const Calibration& calibration);
+                                        const Calibration& calibration,
+                                        double max_age_days = kMaxAgeDays);
+
+/// `stale-by-age`, if the calibration's pictures were taken more than that before or
+/// after the session's. Nothing where either's time isn't known.
+std::vector<Warning> CompareAge(const acquire::SessionReader& session,
+                                const Calibration& calibration,
+                                double max_age_days);
 
 }  // namespace nacre::calibrate

@@ -14,6 +14,7 @@ struct Arguments {
   std::filesystem::path session;
   std::filesystem::path out;
   std::filesystem::path check;
+  double max_age_days = calibrate::kMaxAgeDays;
   calibrate::CalibrateOptions options;
 };
 
@@ -40,7 +41,7 @@ int CheckCalibration(const acquire::SessionReader& session,
   const calibrate::Calibration calibration =
       calibrate::ReadCalibration(arguments.check);
   std::vector<calibrate::Warning> warnings =
-      calibrate::CompareWithSession(session, calibration);
+      calibrate::CompareWithSession(session, calibration, arguments.max_age_days);
   const calibrate::SessionState state =
       calibrate::ExamineSession(session, calibration, ConsoleProgress(common));
   const std::size_t stale = warnings.size();
@@ -121,6 +122,11 @@ std::function<int()> MakeCalibrateVerb(CLI::App& app, const Common& common) {
   app.add_option("--check",
                  arguments->check,
                  "an earlier calibration: say whether it is still true of the session");
+  app.add_option("--max-age-days",
+                 arguments->max_age_days,
+                 "with --check: how far apart both may have been captured")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   AddOptions(app, arguments->options);
   return [arguments, &common] {
     if (arguments->out.empty() == arguments->check.empty()) {

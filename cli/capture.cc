@@ -223,8 +223,13 @@ CaptureOutcome RunCapture(const CaptureRequest& request,
       request.resume && !request.seed ? acquire::ReadManifest(request.out).seed
                                       : request.seed;
   const std::unique_ptr<RigDevices> rig = Open(request, seed);
-  const acquire::SessionManifest manifest = acquire::MakeManifest(
+  acquire::SessionManifest manifest = acquire::MakeManifest(
       rig->description(), rig->camera().Info(), rig->illuminator().Info(), seed);
+  if (rig->description().kind != "simulated" && !request.dry_run) {
+    manifest.captured_unix_s = std::chrono::duration_cast<std::chrono::seconds>(
+                                   std::chrono::system_clock::now().time_since_epoch())
+                                   .count();
+  }
   const Preview preview(request, rig->description(), manifest.camera);
   const ProgressFunction watched = preview.Watch(progress);
   acquire::SessionWriter session =

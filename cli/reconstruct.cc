@@ -76,6 +76,11 @@ std::function<int()> MakeReconstructVerb(CLI::App& app, const Common& common) {
       args->options.incremental,
       "take a session that isn't complete, and go on from OUT.work of the last "
       "run: only new pictures are read");
+  app.add_option("--max-age-days",
+                 args->options.max_age_days,
+                 "warn if the calibration was captured that long before or after")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   AddOptions(app, args->options);
   return [args, &common] { return Run(*args, common); };
 }

@@ -227,6 +227,10 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   summary.group_count = session.schedule().group_count();
   summary.slice_count = header.PointCount();
   RdWriter writer(out, header);
+  for (const calibrate::Warning& warning :
+       calibrate::CompareAge(session, of_rig, options.max_age_days)) {
+    summary.warnings.push_back(warning.name + ": " + warning.text);
+  }
   for (const calibrate::Warning& warning : state.warnings) {
     summary.warnings.push_back(warning.name + ": " + warning.text);
   }

@@ -2,6 +2,7 @@
 
 #include "acquire/session.h"
 #include "calibrate/calibration.h"
+#include "calibrate/session_state.h"
 #include "core/options.h"
 #include "core/progress.h"
 #include "reconstruct/reciprocity.h"
@@ -13,8 +14,8 @@
 
 namespace nacre::reconstruct {
 
-/// `incremental`, `memory_bytes` and `thread_count` aren't listed in Visit: they don't
-/// change a bit of the result.
+/// `incremental`, `memory_bytes`, `max_age_days` and `thread_count` aren't listed in
+/// Visit: they don't change a bit of the result.
 struct ReconstructOptions {
   bool subtract_crosstalk = true;
   bool sharpen_spot = true;
@@ -28,6 +29,7 @@ struct ReconstructOptions {
   bool incremental = false;
   double memory_bytes = 512e6;  ///< for frames under way, at least one is
   int thread_count = 0;         ///< 0: all cores
+  double max_age_days = calibrate::kMaxAgeDays;  ///< see calibrate::CompareAge
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {

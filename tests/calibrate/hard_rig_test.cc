@@ -76,6 +76,7 @@ class HardRig : public ::testing::Test {
   void DriftAndPlaneOfTheSession() const;
   void WarningsNameWhatIsAmiss() const;
   void CorrectionsSurviveTheFile() const;
+  void AgeAloneIsNamed() const;
   void KnowsWhenItIsStale() const;
 
   const Corrections& corrections() const { return calibration_->corrections; }
@@ -235,6 +236,33 @@ void HardRig::CorrectionsSurviveTheFile() const {
             corrections().glare.density_per_px2);
 }
 
+// Simulated sessions are of no time, which their manifests can be given.
+void HardRig::AgeAloneIsNamed() const {
+  constexpr std::int64_t kThen = 1'780'000'000;
+  constexpr std::int64_t kDay = 86400;
+  const std::filesystem::path later = *folder_ / "later";
+  std::filesystem::copy(
+      *folder_ / "s", later, std::filesystem::copy_options::recursive);
+  acquire::SessionManifest manifest = acquire::ReadManifest(later);
+  EXPECT_FALSE(manifest.captured_unix_s.has_value());
+  manifest.captured_unix_s = kThen + 40 * kDay;
+  acquire::WriteManifest(later, manifest);
+  const acquire::SessionReader session(later);
+  Calibration calibration = *calibration_;
+  EXPECT_TRUE(CompareAge(session, calibration, 30).empty());  // of no known time
+  calibration.captured_unix_s = kThen;
+  WriteCalibration(*folder_ / "dated.json", calibration);
+  calibration = ReadCalibration(*folder_ / "dated.json");
+  const std::vector<Warning> warnings = CompareAge(session, calibration, 30);
+  ASSERT_EQ(warnings.size(), 1U);
+  EXPECT_EQ(warnings[0].name, "stale-by-age");
+  EXPECT_THAT(warnings[0].text, ::testing::HasSubstr("40.0 days before"));
+  EXPECT_TRUE(CompareAge(session, calibration, 41).empty());
+  calibration.captured_unix_s = kThen + 80 * kDay;
+  EXPECT_THAT(CompareAge(session, calibration, 30).at(0).text,
+              ::testing::HasSubstr("40.0 days after"));
+}
+
 void HardRig::KnowsWhenItIsStale() const {
   const acquire::SessionReader session(*folder_ / "s");
   EXPECT_TRUE(CompareWithSession(session, *calibration_).empty());
@@ -248,6 +276,7 @@ void HardRig::KnowsWhenItIsStale() const {
   }
   EXPECT_THAT(names,
               ::testing::ElementsAre("stale-dark", "stale-geometry", "stale-flux"));
+  AgeAloneIsNamed();
   other.corrections.filters.mosaic = "RGGB";
   const std::vector<Warning> of_another = CompareWithSession(session, other);
   ASSERT_EQ(of_another.size(), 1U);
