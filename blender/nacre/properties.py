@@ -12,57 +12,65 @@ MODELS = (
 )
 
 
+def _changed(settings, _context):
+    """The evaluated copy, which is what gets rendered, isn't made again by itself."""
+    settings.id_data.update_tag()
+
+
 class NacreMaterial(bpy.types.PropertyGroup):
     model: bpy.props.EnumProperty(
-        name="Subsurface", description="How light spreads under the surface", items=MODELS
+        update=_changed, name="Subsurface", description="How light spreads under the surface",
+        items=MODELS,
     )
     source: bpy.props.EnumProperty(
-        name="From",
+        update=_changed, name="From",
         items=(("PRESET", "Preset", "One of the list"), ("FILE", "File", "A *.nacre.exr")),
     )
-    preset: bpy.props.EnumProperty(name="Preset", items=presets.enum_items)
-    file: bpy.props.StringProperty(name="File", subtype="FILE_PATH")
+    preset: bpy.props.EnumProperty(update=_changed, name="Preset", items=presets.enum_items)
+    file: bpy.props.StringProperty(update=_changed, name="File", subtype="FILE_PATH")
     mm_per_unit: bpy.props.FloatProperty(
-        name="Millimetres per unit",
+        update=_changed, name="Millimetres per unit",
         description="Physical scale: millimetres of the material that one Blender unit is",
         default=1000.0,
         min=1e-6,
         soft_max=10000.0,
     )
     sigma_a: bpy.props.FloatVectorProperty(
-        name="Absorption", description="per mm", size=3, default=(0.0021, 0.0041, 0.0071), min=0.0,
-        precision=4,
+        update=_changed, name="Absorption", description="per mm", size=3,
+        default=(0.0021, 0.0041, 0.0071), min=0.0, precision=4,
     )
     sigma_s: bpy.props.FloatVectorProperty(
-        name="Scattering", description="per mm", size=3, default=(2.19, 2.62, 3.0), min=0.0,
-        precision=3,
+        update=_changed, name="Scattering", description="per mm", size=3,
+        default=(2.19, 2.62, 3.0), min=0.0, precision=3,
     )
     anisotropy: bpy.props.FloatProperty(
-        name="Anisotropy", description="Mean cosine of scattering", default=0.0, min=-0.95, max=0.95
+        update=_changed, name="Anisotropy", description="Mean cosine of scattering", default=0.0,
+        min=-0.95, max=0.95,
     )
     ior: bpy.props.FloatProperty(
-        name="IOR", default=1.5, min=1.0, max=4.0,
+        update=_changed, name="IOR", default=1.5, min=1.0, max=4.0,
         description="Index of refraction; a medium of index 1 has no boundary",
     )
     roughness: bpy.props.FloatProperty(
-        name="Coat roughness", default=0.2, min=0.01, max=1.0,
+        update=_changed, name="Coat roughness", default=0.2, min=0.01, max=1.0,
         description="Of the surface: of its reflection, and of the boundary of a medium",
     )
 
 
 class NacreScene(bpy.types.PropertyGroup):
     samples: bpy.props.IntProperty(
-        name="Samples", description="a pixel", default=64, min=1, max=65536)
+        update=_changed, name="Samples", description="a pixel", default=64, min=1, max=65536)
     preview_samples: bpy.props.IntProperty(
-        name="Viewport samples", description="a pixel", default=4, min=1, max=4096)
+        update=_changed, name="Viewport samples", description="a pixel", default=4, min=1,
+        max=4096)
     max_depth: bpy.props.IntProperty(
-        name="Path depth", default=6, min=1, max=1024,
+        update=_changed, name="Path depth", default=6, min=1, max=1024,
         description="Edges of a path, at most; not counted where there are participating media")
-    seed: bpy.props.IntProperty(name="Seed", default=1, min=0)
+    seed: bpy.props.IntProperty(update=_changed, name="Seed", default=1, min=0)
     time_limit: bpy.props.FloatProperty(
-        name="Time limit", description="Seconds; 0: none", default=0.0, min=0.0)
+        update=_changed, name="Time limit", description="Seconds; 0: none", default=0.0, min=0.0)
     keep_files: bpy.props.StringProperty(
-        name="Keep files in", subtype="DIR_PATH",
+        update=_changed, name="Keep files in", subtype="DIR_PATH",
         description="Folder for scene.xml and what belongs to it; empty: they are removed",
     )
 
