@@ -1,6 +1,7 @@
 #include "acquire/frame_file.h"
 
 #include "core/error.h"
+#include "core/write_all.h"
 
 #include <algorithm>
 #include <bit>
@@ -137,16 +138,7 @@ void WriteFrameFile(const std::filesystem::path& path,
   if (fd < 0) {
     throw SystemError("cannot write " + path.string());
   }
-  bool failed = false;
-  while (!bytes.empty() && !failed) {
-    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-    if (written >= 0) {
-      bytes.remove_prefix(static_cast<std::size_t>(written));
-    } else {
-      failed = errno != EINTR;
-    }
-  }
-  failed = failed || (durable && ::fdatasync(fd) != 0);
+  const bool failed = !WriteAll(fd, bytes) || (durable && ::fdatasync(fd) != 0);
   const int error = errno;
   if (::close(fd) != 0 || failed) {
     errno = failed ? error : errno;

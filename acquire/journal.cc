@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/hash.h"
 #include "core/json.h"
+#include "core/write_all.h"
 
 #include <cerrno>
 #include <fcntl.h>
@@ -181,17 +182,8 @@ JournalWriter::~JournalWriter() {
 }
 
 void JournalWriter::Append(const JournalEntry& entry) {
-  const std::string line = FormatJournalLine(entry);
-  std::string_view rest = line;
-  while (!rest.empty()) {
-    const ssize_t written = ::write(fd_, rest.data(), rest.size());
-    if (written < 0 && errno == EINTR) {
-      continue;
-    }
-    if (written < 0) {
-      throw SystemError("cannot write " + path_.string());
-    }
-    rest.remove_prefix(static_cast<std::size_t>(written));
+  if (!WriteAll(fd_, FormatJournalLine(entry))) {
+    throw SystemError("cannot write " + path_.string());
   }
 }
 

@@ -1,5 +1,6 @@
 #include "acquire/session_writer.h"
 #include "core/error.h"
+#include "core/write_all.h"
 
 #include <cerrno>
 #include <fcntl.h>
@@ -33,8 +34,7 @@ SessionLock::SessionLock(const std::filesystem::path& folder)
   }
   // Only a courtesy to whoever finds it locked; the lock is the flock.
   const std::string process = std::to_string(::getpid());
-  if (::ftruncate(fd_, 0) != 0 || ::pwrite(fd_, process.data(), process.size(), 0) !=
-                                      static_cast<ssize_t>(process.size())) {
+  if (::ftruncate(fd_, 0) != 0 || !WriteAll(fd_, process)) {
     const Error error = SystemError("cannot write " + (folder / "lock").string());
     ::close(fd_);
     throw error;

@@ -1,6 +1,7 @@
 #include "core/atomic_file.h"
 
 #include "core/error.h"
+#include "core/write_all.h"
 
 #include <atomic>
 #include <cerrno>
@@ -72,18 +73,11 @@ void WriteFile(const std::filesystem::path& path, std::string_view bytes) {
   if (fd < 0) {
     throw SystemError("cannot write " + path.string());
   }
-  while (!bytes.empty()) {
-    const ssize_t written = ::write(fd, bytes.data(), bytes.size());
-    if (written < 0 && errno == EINTR) {
-      continue;
-    }
-    if (written < 0) {
-      const int error = errno;
-      ::close(fd);
-      errno = error;
-      throw SystemError("cannot write " + path.string());
-    }
-    bytes.remove_prefix(static_cast<std::size_t>(written));
+  if (!WriteAll(fd, bytes)) {
+    const int error = errno;
+    ::close(fd);
+    errno = error;
+    throw SystemError("cannot write " + path.string());
   }
   if (::close(fd) != 0) {
     throw SystemError("cannot write " + path.string());
