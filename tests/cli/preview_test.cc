@@ -129,6 +129,14 @@ TEST_F(PreviewTest, OnlyWhoKnowsTheTokenIsAnswered) {
   wrong[1] = wrong[1] == '0' ? '1' : '0';
   EXPECT_EQ(client.Get(wrong)->status, 404);
   EXPECT_EQ(client.Post(Path())->status, 404);
+  for (const char* path : {"../../../../etc/passwd",
+                           "..%2f..%2f..%2fetc%2fpasswd",
+                           "%2e%2e/%2e%2e/etc/passwd",
+                           "/etc/passwd",
+                           "....//etc/passwd",
+                           "state.json%00.html"}) {
+    EXPECT_EQ(client.Get(Path(path))->status, 404) << path;
+  }
   EXPECT_GE(Path().size(), 34U) << "128 bits of it";
   EXPECT_NE(Server(monitor_, 0).url().substr(20), server_.url().substr(20));
 }
@@ -136,6 +144,8 @@ TEST_F(PreviewTest, OnlyWhoKnowsTheTokenIsAnswered) {
 TEST_F(PreviewTest, AnotherHostsNameIsRefused) {
   httplib::Client client("127.0.0.1", Port());
   EXPECT_EQ(client.Get(Path("state.json"), {{"Host", "evil.example"}})->status, 403);
+  EXPECT_EQ(client.Get(Path("state.json"), {{"Origin", "http://evil.example"}})->status,
+            403);
 }
 
 TEST_F(PreviewTest, ThePageNeedsNothingFromElsewhere) {
