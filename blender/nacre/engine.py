@@ -69,23 +69,29 @@ class NacreEngine(bpy.types.RenderEngine):
     def _follow(self, rendering, result):
         """Shows what is there until the end. True if it was stopped."""
         shown = None
-        while rendering.running():
-            if self.test_break():
-                rendering.stop()
-                return True
-            self.update_progress(rendering.progress)
-            self.update_stats("", "Nacre: " + rendering.stage)
-            if os.path.isfile(rendering.picture):
-                written = os.path.getmtime(rendering.picture)
-                if written != shown:
-                    shown = written
-                    result.layers[0].load_from_file(rendering.picture)
-                    self.update_result(result)
-            time.sleep(POLL_S)
+        try:
+            while rendering.running():
+                if self.test_break():
+                    return True
+                self.update_progress(rendering.progress)
+                self.update_stats("", "Nacre: " + rendering.stage)
+                if os.path.isfile(rendering.picture):
+                    written = os.path.getmtime(rendering.picture)
+                    if written != shown:
+                        shown = written
+                        self._show(rendering.picture, result)
+                time.sleep(POLL_S)
+        finally:
+            rendering.stop()
         for line in rendering.finish():
             print("nacre: " + line)
         result.layers[0].load_from_file(rendering.picture)
         return False
+
+    def _show(self, picture, result):
+        """What is there before the end."""
+        result.layers[0].load_from_file(picture)
+        self.update_result(result)
 
     def view_update(self, context, depsgraph):
         if self._view is not None:

@@ -9,7 +9,7 @@ import support
 from support import check
 
 support.install()
-from nacre import log, process  # noqa: E402
+from nacre import engine, log, process  # noqa: E402
 
 COMMAND = os.environ["NACRE"]
 support.empty_scene()
@@ -146,6 +146,30 @@ kept = support.path("kept")
 bpy.context.scene.nacre.keep_files = kept
 support.render("kept-files")
 check(os.path.isfile(os.path.join(kept, "scene.xml")), "files are kept where told")
+
+# A picture that isn't finished is shown: this command waits until it was.
+painter, seen = support.path("painter"), support.path("seen")
+with open(painter, "w", encoding="utf-8") as file:
+    file.write("#!/bin/sh\ncp '%s' \"$4.part\" && mv \"$4.part\" \"$4\"\n"
+               "for wait in $(seq 1200); do [ -e '%s' ] && exit 0; sleep 0.05; done; exit 1\n"
+               % (os.path.join(kept, "picture.exr"), seen))
+os.chmod(painter, 0o755)
+
+
+show = engine.NacreEngine._show
+
+
+def watched(self, picture, result):
+    show(self, picture, result)
+    with open(seen, "w", encoding="utf-8"):
+        pass
+
+
+bpy.context.scene.nacre.keep_files = ""
+os.environ["NACRE"] = painter
+engine.NacreEngine._show = watched
+support.render("painted")
+check(os.path.exists(seen), "an unfinished picture is shown")
 leftovers = [name for name in os.listdir(support.FOLDER) if name.startswith("nacre-blender-")]
 check(not leftovers, "no temporary files stay")
 support.done()
