@@ -203,6 +203,24 @@ void Measure(const GroupReader& reader,
   }
 }
 
+// What the session's own pictures say, and what is to be warned of.
+calibrate::SessionState Examine(const acquire::SessionReader& session,
+                                const calibrate::Calibration& of_rig,
+                                const ReconstructOptions& options,
+                                ReconstructSummary& summary) {
+  calibrate::SessionState state =
+      calibrate::ExamineSession(session, of_rig, {}, options.thread_count);
+  state.plane = Settle(state.plane);
+  for (const calibrate::Warning& warning :
+       calibrate::CompareAge(session, of_rig, options.max_age_days)) {
+    summary.warnings.push_back(warning.name + ": " + warning.text);
+  }
+  for (const calibrate::Warning& warning : state.warnings) {
+    summary.warnings.push_back(warning.name + ": " + warning.text);
+  }
+  return state;
+}
+
 }  // namespace
 
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
@@ -213,13 +231,11 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   nacre::Validate(options);
   const auto start = std::chrono::steady_clock::now();
   CheckSameRig(session, of_rig, options.incremental);
-  calibrate::SessionState state =
-      calibrate::ExamineSession(session, of_rig, {}, options.thread_count);
-  state.plane = Settle(state.plane);
+  ReconstructSummary summary;
+  const calibrate::SessionState state = Examine(session, of_rig, options, summary);
   calibrate::Calibration calibration = of_rig;
   calibration.camera = of_rig.camera.OnPlane(state.plane);
   const RdHeader header = HeaderOf(session, calibration, options);
-  ReconstructSummary summary;
   const calibrate::SpotProfile spot = options.sharpen_spot
                                           ? internal::SpotOf(session, of_rig)
                                           : calibrate::SpotProfile{};
@@ -227,13 +243,6 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   summary.group_count = session.schedule().group_count();
   summary.slice_count = header.PointCount();
   RdWriter writer(out, header);
-  for (const calibrate::Warning& warning :
-       calibrate::CompareAge(session, of_rig, options.max_age_days)) {
-    summary.warnings.push_back(warning.name + ": " + warning.text);
-  }
-  for (const calibrate::Warning& warning : state.warnings) {
-    summary.warnings.push_back(warning.name + ": " + warning.text);
-  }
   const GroupReader reader(
       session, calibration, state, header, spot, options.thread_count);
   const std::filesystem::path work = WorkFile(out);
@@ -277,13 +286,6 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
       advice,
       *std::max_element(exposures_us.begin(), exposures_us.end())};
   internal::WriteSlices(separation, finishing, options, writer, summary, progress);
-  if (summary.below_floor_count > 0) {
-    summary.warnings.push_back(fmt::format(
-        "glare-floor: {} of {} values are below what glare leaves uncertain "
-        "and are marked as not valid",
-        summary.below_floor_count,
-        header.PointCount() * header.SliceSize()));
-  }
   writer.Finish();
   RdReader written(out);
   summary.reciprocity = MeasureReciprocity(written);

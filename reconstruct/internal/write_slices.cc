@@ -7,6 +7,7 @@
 #include "reconstruct/internal/systematics.h"
 
 #include <algorithm>
+#include <fmt/format.h>
 #include <future>
 #include <utility>
 
@@ -99,6 +100,13 @@ void WriteSlices(const Separation& separation,
   }
   if (std::string text = finishing.advice.Warning(dim); !text.empty()) {
     summary.warnings.push_back(std::move(text));
+  }
+  if (summary.below_floor_count > 0) {
+    summary.warnings.push_back(fmt::format(
+        "glare-floor: {} of {} values are below what glare leaves uncertain "
+        "and are marked as not valid",
+        summary.below_floor_count,
+        total * finishing.header.SliceSize()));
   }
   summary.symmetrize_change = change.Share();
   summary.symmetrize_worst_total = change.worst_total;
