@@ -24,6 +24,8 @@ struct Arguments {
   std::filesystem::path png;
   std::vector<std::string> defines;
   bool lenient = false;
+  bool allow_outside = false;
+  double material_error = 0;
   bool stats = false;
   bool reference = false;
   bool adaptive = false;
@@ -48,6 +50,17 @@ void AddArguments(CLI::App& app, Arguments& arguments) {
   app.add_flag("--lenient",
                arguments.lenient,
                "unknown words in the scene are left out with a warning");
+  app.add_flag("--allow-outside",
+               arguments.allow_outside,
+               "the scene may name files that aren't in its folder; those given by -D "
+               "it may always");
+  app.add_option(
+         "--material-error",
+         arguments.material_error,
+         "leave out last terms of factored materials that together change R_d by "
+         "at most this much of its largest value")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 1.0));
   app.add_flag("--stats", arguments.stats, "print where time went and what was done");
   app.add_flag(
       "--reference", arguments.reference, "the same as --integrator reference");
@@ -91,6 +104,9 @@ std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments)
   provenance.options["define"] = arguments.defines;
   if (arguments.denoise) {
     provenance.options["denoise"] = true;
+  }
+  if (arguments.material_error > 0) {
+    provenance.options["material_error"] = arguments.material_error;
   }
   for (const std::filesystem::path& file : scene.files) {
     provenance.AddInput(file);
@@ -161,9 +177,12 @@ int Run(Arguments& arguments, const Common& common) {
   if (arguments.denoise) {
     render::RequireDenoiser();
   }
-  const render::Scene scene = render::ReadScene(
-      arguments.scene,
-      {.defines = ParseDefines(arguments.defines), .lenient = arguments.lenient});
+  const render::Scene scene =
+      render::ReadScene(arguments.scene,
+                        {.defines = ParseDefines(arguments.defines),
+                         .lenient = arguments.lenient,
+                         .allow_outside = arguments.allow_outside,
+                         .material_error = arguments.material_error});
   for (const std::string& note : scene.notes) {
     Say(common, note);
   }

@@ -141,6 +141,8 @@ void Exitances::AddUse(ModelUse& use) const {
       use.tiles += of_shape.tiles;
       use.tiles_total += of_shape.tiles_total;
       use.channels = std::max(use.channels, of_shape.channels);
+      use.terms += of_shape.terms;
+      use.terms_total += of_shape.terms_total;
     }
   }
 }

@@ -50,6 +50,12 @@ struct SceneOptions {
   std::map<std::string, std::string>
       defines{};         ///< `$name`s, before the file's defaults
   bool lenient = false;  ///< an unknown word is a note instead of an error
+  /// The scene may read files that aren't in its folder. Those that a definition names,
+  /// or that lie in a folder it names, it may read anyway.
+  bool allow_outside = false;
+  /// Of R_d's largest value, that may be missing of a measured material: terms that
+  /// bring less aren't evaluated.
+  double material_error = 0;
 };
 
 /// Reads a scene in the XML of Mitsuba 0.4–0.6. Throws BadData with file:line.

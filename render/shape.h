@@ -43,6 +43,7 @@ struct Shape {
   BsdfPtr bsdf;                   ///< null: reflects nothing
   std::optional<Color> radiance;  ///< emitted on the outside
   float sampling_weight = 1;      ///< of the emission, among the lights
+  bool hidden = false;            ///< the camera looks through it
   std::optional<Translucency> translucency;
   MediumPtr interior;  ///< behind the surface; null: what is outside is inside too
   MediumPtr exterior;

@@ -45,6 +45,7 @@ std::string RenderSummary::Table() const {
       "pairs            {:>12}\n"
       "windows          {:>12} of {}\n"
       "tiles            {:>12} of {}\n"
+      "terms            {:>12} of {}\n"
       "channels read    {:>12}\n"
       "probes           {:>12}{}\n"
       "relative error   {:>12.4f}\n"
@@ -70,6 +71,8 @@ std::string RenderSummary::Table() const {
       use.windows_total,
       use.tiles,
       use.tiles_total,
+      use.terms,
+      use.terms_total,
       use.channels,
       probes,
       probes_cut > 0 ? fmt::format(" ({} cut short)", probes_cut) : "",
@@ -111,6 +114,8 @@ Json RenderSummary::ToJson() const {
           {"tiles", use.tiles},
           {"tiles_total", use.tiles_total},
           {"channels_read", use.channels},
+          {"terms", use.terms},
+          {"terms_total", use.terms_total},
           {"bad_samples", bad_samples},
           {"clamped_samples", clamped_samples},
           {"seconds",

@@ -21,7 +21,8 @@ class Rendering:
         self.stage = "starting"
         self.last_lines = collections.deque(maxlen=12)
         self._process = subprocess.Popen(
-            [command, "render", scene, "--out", picture, "--lenient", *options],
+            [command, "render", scene, "--out", picture, "--lenient", "--allow-outside",
+             *options],
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()

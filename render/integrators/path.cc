@@ -26,6 +26,24 @@ Vec3 LitSide(const SurfaceHit& hit, Vec3 wo) {
   return wo.z > 0 ? hit.normal : -hit.normal;
 }
 
+// The shading normal, turned to the viewer in their common plane where it turns away
+// from it although the surface doesn't: at the silhouette of a coarse smooth mesh,
+// which would be black. Its cosine is at least half the surface's, so that nothing
+// changes where the mesh is fine.
+Vec3 TowardsViewer(const SurfaceHit& hit, Vec3 to_viewer) {
+  const float at_surface = Dot(hit.face_normal, to_viewer);
+  const float least = 0.5F * at_surface;
+  const float cosine = Dot(hit.normal, to_viewer);
+  if (at_surface >= 0 ? cosine >= least : cosine <= least) {
+    return hit.normal;
+  }
+  const Vec3 across = hit.normal - to_viewer * cosine;
+  const float length = Length(across);
+  return length > 0
+             ? to_viewer * least + across * (std::sqrt(1 - least * least) / length)
+             : hit.face_normal;
+}
+
 }  // namespace
 
 PathTracer::PathTracer(const World& world,
@@ -50,7 +68,8 @@ PathTracer::Result PathTracer::Radiance(const Ray& ray,
               .sampler = sampler,
               .counters = counters,
               .max_depth = direct ? 2 : settings_.max_depth,
-              .count_emission = !settings_.hide_emitters};
+              .count_emission = !settings_.hide_emitters,
+              .from_camera = true};
   Trace(state);
   return {state.radiance, state.alpha};
 }
@@ -101,8 +120,13 @@ void PathTracer::Trace(State& state) const {
       state.ray = {OffsetOrigin(hit, state.ray.direction), state.ray.direction};
       continue;
     }
+    if (hit.shape->hidden && state.from_camera) {
+      state.ray = {OffsetOrigin(hit, state.ray.direction), state.ray.direction};
+      continue;
+    }
     state.alpha = 1;
     const Vec3 to_viewer = -state.ray.direction;
+    hit.normal = TowardsViewer(hit, to_viewer);
     if (hit.shape->radiance && CountsEmission(state)) {
       const float other = state.delta ? 0 : world_.EmissionPdf(hit, state.origin);
       const float weight = state.delta ? 1 : PowerHeuristic(state.pdf, other);
@@ -218,6 +242,7 @@ bool PathTracer::Continue(State& state,
   state.origin = hit.position;
   state.side = LitSide(hit, wo);
   state.count_emission = true;
+  state.from_camera = false;
   state.ray = {OffsetOrigin(hit, wi), wi};
   if (has_media_ && sample.wi.z * wo.z < 0) {
     state.medium = MediumBeyond(hit, wi, state.medium);

@@ -9,6 +9,14 @@
 #include <fmt/format.h>
 
 namespace nacre::render {
+namespace {
+
+bool IsWithin(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  return std::mismatch(folder.begin(), folder.end(), path.begin(), path.end()).first ==
+         folder.end();
+}
+
+}  // namespace
 
 std::string Document::Where(const pugi::xml_node& node) const {
   const std::ptrdiff_t offset =
@@ -78,6 +86,7 @@ std::string Document::RequiredAttribute(const pugi::xml_node& node,
 std::filesystem::path Document::File(const pugi::xml_node& node,
                                      const std::string& name) {
   const std::filesystem::path path = folder / name;
+  CheckAllowed(node, path);
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) {
     throw ErrorAt(
@@ -86,6 +95,20 @@ std::filesystem::path Document::File(const pugi::xml_node& node,
   }
   scene.files.push_back(path);
   return path;
+}
+
+void Document::CheckAllowed(const pugi::xml_node& node,
+                            const std::filesystem::path& path) const {
+  const std::filesystem::path real = std::filesystem::weakly_canonical(path);
+  const auto holds = [&](const std::filesystem::path& place) {
+    return IsWithin(real, place);
+  };
+  if (allowed && std::none_of(allowed->begin(), allowed->end(), holds)) {
+    throw ErrorAt(node,
+                  fmt::format("'{}' isn't in the scene's folder; if the scene may read "
+                              "files elsewhere: --allow-outside",
+                              path.string()));
+  }
 }
 
 std::vector<double> ParseNumbers(const Document& document,

@@ -6,6 +6,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <pugixml.hpp>
 #include <string>
 #include <vector>
@@ -25,11 +26,14 @@ struct Document {
   std::string origin;
   std::string text;
   std::filesystem::path folder;
+  /// Where files may be read from, besides; nothing of it: anywhere.
+  std::optional<std::vector<std::filesystem::path>> allowed;
   std::vector<std::filesystem::path>
       included;  ///< files now being read, outermost first
   bool has_sensor = false;
   bool has_integrator = false;
   bool lenient = false;
+  double material_error = 0;
   std::map<std::string, std::string> defines;
   std::map<std::string, BsdfPtr> bsdfs;            ///< by id
   std::map<std::string, TexturePtr> textures;      ///< by id
@@ -49,8 +53,13 @@ struct Document {
   /// As Attribute, but an error if it isn't there.
   std::string RequiredAttribute(const pugi::xml_node& node, const char* name) const;
 
-  /// A file named in the scene: relative to the scene's folder. Must exist.
+  /// A file named in the scene: relative to the scene's folder. Must exist, and be one
+  /// that scenes may read.
   std::filesystem::path File(const pugi::xml_node& node, const std::string& name);
+  /// Throws for a file that scenes may not read: a scene from somewhere else isn't to
+  /// look around here.
+  void CheckAllowed(const pugi::xml_node& node,
+                    const std::filesystem::path& path) const;
 };
 
 /// All numbers of a text, separated by blanks and commas. Throws ErrorAt for anything

@@ -144,6 +144,20 @@ void ReadScene(Document& document, const pugi::xml_node& root) {
   NoteSmallCores(document);
 }
 
+// The scene's folder, and what the caller's definitions name.
+std::vector<std::filesystem::path> AllowedPlaces(
+    const std::filesystem::path& folder,
+    const std::map<std::string, std::string>& defines) {
+  const std::filesystem::path base = folder.empty() ? "." : folder;
+  std::vector<std::filesystem::path> places{std::filesystem::weakly_canonical(base)};
+  for (const auto& define : defines) {
+    if (!define.second.empty()) {
+      places.push_back(std::filesystem::weakly_canonical(base / define.second));
+    }
+  }
+  return places;
+}
+
 }  // namespace
 
 void UnknownPlugin(Element& element, const std::vector<std::string>& known) {
@@ -164,7 +178,11 @@ Scene ParseScene(const std::string& xml,
   document.folder = folder;
   document.included = {std::filesystem::weakly_canonical(origin)};
   document.lenient = options.lenient;
+  document.material_error = options.material_error;
   document.defines = options.defines;
+  if (!options.allow_outside) {
+    document.allowed = AllowedPlaces(folder, options.defines);
+  }
   document.scene.origin = origin;
   ReadText(document, [&](const pugi::xml_node& root) { ReadScene(document, root); });
   return std::move(document.scene);

@@ -129,6 +129,7 @@ void ReadAreaEmitter(Element emitter, Shape& shape) {
                              emitter.type()));
   }
   shape.radiance = emitter.Spectrum("radiance", {1, 1, 1});
+  shape.hidden = emitter.Boolean("hidden", false);
   shape.sampling_weight = static_cast<float>(
       InRange(emitter, "samplingWeight", emitter.Float("samplingWeight", 1), {0, 1e9}));
   emitter.Finish();

@@ -1,4 +1,3 @@
-#include "factor/material.h"
 #include "render/preset_path.h"
 #include "render/scene_reader/mapping.h"
 #include "render/scene_reader/objects.h"
@@ -83,11 +82,19 @@ std::shared_ptr<const SubsurfaceModel> ReadAnalytic(Element& element,
 }
 
 std::filesystem::path FindMaterial(Element& element, const std::string& name) {
+  std::filesystem::path path;
   try {
-    return FindPreset(name, element.document().folder);
+    path = FindPreset(name, element.document().folder);
   } catch (const Error& e) {
     element.FailAt("material", e.what());
   }
+  // Names lead to the folders of presets, and nowhere else.
+  const std::filesystem::path as_path(name);
+  const bool climbs = std::find(as_path.begin(), as_path.end(), "..") != as_path.end();
+  if (as_path.is_absolute() || climbs) {
+    element.document().CheckAllowed(element.node(), path);
+  }
+  return path;
 }
 
 std::shared_ptr<const SubsurfaceModel> ReadMeasured(Element& element,
@@ -104,8 +111,7 @@ std::shared_ptr<const SubsurfaceModel> ReadMeasured(Element& element,
   element.document().scene.files.push_back(path);
   const auto source = path.string().ends_with(".rd.exr")
                           ? OpenDatasetSource(path)
-                          : MakeMaterialSource(std::make_shared<const factor::Material>(
-                                factor::ReadMaterial(path)));
+                          : OpenMaterialSource(path, element.document().material_error);
   translucency.core_mm = static_cast<float>(source->core * source->pitch_mm);
   NoteScale(element, shape, translucency, *source, mapping.mapping);
   return MakeMeasured(source, {}, mapping);

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <mutex>
 #include <numbers>
 #include <span>
 
@@ -318,11 +319,18 @@ class Factored final : public SubsurfaceModel {
   }
 
   ModelUse Use() const override {
-    return {.windows = windows_->evaluated_count(),
+    const std::lock_guard lock(lit_mutex_);
+    std::int64_t evaluated = windows_->evaluated_count();
+    for (const auto& windows : lit_windows_) {
+      evaluated += windows->evaluated_count();
+    }
+    return {.windows = evaluated,
             .windows_total = windows_->window_count(),
             .tiles = windows_->source().tiles_read(),
             .tiles_total = windows_->source().tiles_total(),
-            .channels = static_cast<int>(windows_->source().channels.size())};
+            .channels = windows_->source().channels_read(),
+            .terms = windows_->source().terms_used(),
+            .terms_total = windows_->source().terms_total()};
   }
 
   std::unique_ptr<Subsurface> Illuminate(std::vector<LitPoint> lit,
@@ -330,19 +338,41 @@ class Factored final : public SubsurfaceModel {
     // Of projections a point has several places, which overlap: they blur borders.
     const bool by_uv = mapping_.mapping() == Mapping::kTexture ||
                        mapping_.mapping() == Mapping::kWorld;
-    const auto part_of = by_uv ? PartFunction([&](const SurfacePoint& p) {
-      return windows_->PartAt(p.uv);
-    })
-                               : PartFunction();
+    const auto windows = WindowsFor(lit);
+    const auto part_of =
+        by_uv
+            ? PartFunction([&](const SurfacePoint& p) { return windows->PartAt(p.uv); })
+            : PartFunction();
     return std::make_unique<FactoredGather>(
-        windows_,
+        windows,
         GatherPatches(lit, PatchSizeMm(), part_of, thread_count),
         mapping_,
         options_);
   }
 
  private:
+  /// With the colours that there is light of, so that the others needn't be read.
+  std::shared_ptr<const MaterialWindows> WindowsFor(
+      const std::vector<LitPoint>& lit) const {
+    std::array<bool, 3> colours{};
+    for (const LitPoint& point : lit) {
+      for (std::size_t c = 0; c < 3; ++c) {
+        colours[c] = colours[c] || point.flux_density[static_cast<int>(c)] > 0;
+      }
+    }
+    if (colours[0] && colours[1] && colours[2]) {
+      return windows_;
+    }
+    auto windows = std::make_shared<const MaterialWindows>(
+        windows_->source_ptr(), options_.window_cache_mb, colours);
+    const std::lock_guard lock(lit_mutex_);
+    lit_windows_.push_back(windows);
+    return windows;
+  }
+
   std::shared_ptr<const MaterialWindows> windows_;
+  mutable std::mutex lit_mutex_;
+  mutable std::vector<std::shared_ptr<const MaterialWindows>> lit_windows_;
   MaterialMapping mapping_;
   float eta_;
   FactoredOptions options_;

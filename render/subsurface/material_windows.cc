@@ -97,7 +97,8 @@ const T& FindOrMake(std::atomic<const T*>& slot, const Make& make) {
 }  // namespace
 
 MaterialWindows::MaterialWindows(std::shared_ptr<const WindowSource> source,
-                                 double cache_mb)
+                                 double cache_mb,
+                                 const std::array<bool, 3>& colours)
     : source_(std::move(source)),
       channel_of_colour_(ChannelsOfColours(source_->channels)),
       internal_reflectance_(DiffuseFresnelReflectance(1 / source_->eta)),
@@ -105,6 +106,9 @@ MaterialWindows::MaterialWindows(std::shared_ptr<const WindowSource> source,
       kept_(static_cast<std::size_t>(source_->points_x) *
             static_cast<std::size_t>(source_->points_y)),
       profiles_(kept_.size()) {
+  for (std::size_t c = 0; c < 3; ++c) {
+    channel_of_colour_[c] = colours[c] ? channel_of_colour_[c] : -1;
+  }
   const double cells = static_cast<double>(source_->core) * source_->core;
   kept_most_ = static_cast<std::int64_t>(cache_mb * 1e6 / (sizeof(Cell) * cells));
 }
@@ -127,6 +131,10 @@ MaterialWindows::Entry MaterialWindows::EntryAt(Vec2 uv) const {
   const bool inner_x = column.index > 0 && column.index + 1 < source_->points_x;
   const bool inner_y = row.index > 0 && row.index + 1 < source_->points_y;
   for (std::size_t c = 0; c < 3; ++c) {
+    entry.scale.v[c] = 1;
+    if (channel_of_colour_[c] < 0) {
+      continue;
+    }
     const auto albedo = [&](int di, int dj) {
       return source_->Albedo(channel_of_colour_[c], column.index + di, row.index + dj);
     };
@@ -157,6 +165,9 @@ int MaterialWindows::PartAt(Vec2 uv) const {
   const int beyond_y =
       std::clamp(row.index + (row.beside < 0 ? -1 : 1), 0, source_->points_y - 1);
   for (const int channel : channel_of_colour_) {
+    if (channel < 0) {
+      continue;
+    }
     const float here = source_->Albedo(channel, column.index, row.index);
     for (const float there : {source_->Albedo(channel, beyond_x, row.index),
                               source_->Albedo(channel, column.index, beyond_y),
@@ -172,6 +183,9 @@ int MaterialWindows::PartAt(Vec2 uv) const {
 ColorLanes MaterialWindows::Mean(int window, int u, int v) const {
   ColorLanes mean;
   for (std::size_t c = 0; c < 3; ++c) {
+    if (channel_of_colour_[c] < 0) {
+      continue;
+    }
     mean.v[c] = source_->Evaluate(channel_of_colour_[c],
                                   window % source_->points_x,
                                   window / source_->points_x,
@@ -187,6 +201,9 @@ std::vector<ColorLanes> MaterialWindows::Means(int window) const {
   std::vector<ColorLanes> means(count);
   std::vector<float> values(count);
   for (std::size_t c = 0; c < 3; ++c) {
+    if (channel_of_colour_[c] < 0) {
+      continue;
+    }
     if (c == 0 || channel_of_colour_[c] != channel_of_colour_[c - 1]) {
       source_->EvaluateWindow(channel_of_colour_[c],
                               window % source_->points_x,
@@ -337,8 +354,11 @@ void MaterialWindows::Prefetch(int window,
 Color MaterialWindows::Albedo(int window) const {
   std::array<float, 3> albedo{};
   for (std::size_t c = 0; c < 3; ++c) {
-    albedo[c] = source_->Albedo(
-        channel_of_colour_[c], window % source_->points_x, window / source_->points_x);
+    if (channel_of_colour_[c] >= 0) {
+      albedo[c] = source_->Albedo(channel_of_colour_[c],
+                                  window % source_->points_x,
+                                  window / source_->points_x);
+    }
   }
   return {albedo[0], albedo[1], albedo[2]};
 }

@@ -29,7 +29,10 @@ namespace nacre::render {
 class MaterialWindows {
  public:
   /// BadData unless the material has one channel (used for all three colours) or three.
-  MaterialWindows(std::shared_ptr<const WindowSource> source, double cache_mb);
+  /// Of `colours` that are false nothing is asked; there, R_d is 0.
+  MaterialWindows(std::shared_ptr<const WindowSource> source,
+                  double cache_mb,
+                  const std::array<bool, 3>& colours = {true, true, true});
   ~MaterialWindows();
   MaterialWindows(const MaterialWindows&) = delete;
   MaterialWindows& operator=(const MaterialWindows&) = delete;
@@ -65,6 +68,7 @@ class MaterialWindows {
   std::int64_t evaluated_count() const { return evaluated_count_.load(); }
   std::int64_t window_count() const { return std::ssize(kept_); }
   const WindowSource& source() const { return *source_; }
+  const std::shared_ptr<const WindowSource>& source_ptr() const { return source_; }
 
  private:
   /// q within a cell: value + column · x + row · y, x and y from the cell's middle.
@@ -92,7 +96,7 @@ class MaterialWindows {
   const Cell* Find(int window) const;
 
   std::shared_ptr<const WindowSource> source_;
-  std::array<int, 3> channel_of_colour_{};
+  std::array<int, 3> channel_of_colour_{};  ///< −1: not wanted
   double internal_reflectance_ = 0;
   float radius_ = 0;
   std::int64_t kept_most_ = 0;

@@ -56,7 +56,9 @@ struct ModelUse {
   std::int64_t windows_total = 0;  ///< that there are
   std::int64_t tiles = 0;          ///< read from file; 0 for what is in memory
   std::int64_t tiles_total = 0;
-  int channels = 3;
+  int channels = 3;     ///< read
+  int terms = 0;        ///< of these channels, that count; 0 for models without
+  int terms_total = 0;  ///< of all channels
 };
 
 /// A material, before it has seen any light.

@@ -1,9 +1,12 @@
 #include "render/subsurface/window_source.h"
 
 #include "core/error.h"
+#include "factor/material_file.h"
 #include "reconstruct/rd_dataset.h"
 
+#include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <mutex>
 #include <numeric>
 
@@ -36,6 +39,125 @@ class MaterialSource final : public WindowSource {
 
  private:
   std::shared_ptr<const factor::Material> material_;
+};
+
+float LargestOf(const float* values, std::int64_t count) {
+  float largest = 0;
+  for (std::int64_t n = 0; n < count; ++n) {
+    largest = std::max(largest, std::abs(values[n]));
+  }
+  return largest;
+}
+
+// By how much R_d changes at most, of its largest value, if the sum of terms changes by
+// `s`.
+double ErrorOfSum(const factor::Material& channel, double largest, double s) {
+  switch (channel.transform) {
+    case factor::Transform::kLinear:
+      return s / largest;
+    case factor::Transform::kSqrt:
+      return s * (2 * std::sqrt(largest) + s) / largest;
+    case factor::Transform::kLog:
+      break;
+  }
+  // R_d + A B is multiplied by eˢ.
+  return (1 + channel.a[0] * channel.b[0] / largest) * std::expm1(s);
+}
+
+// A material of one channel without its last terms, as many as `error` allows.
+factor::Material WithinError(const factor::Material& channel, double error) {
+  double largest = 0;
+  for (int j = 0; j < channel.points_y; ++j) {
+    for (int i = 0; i < channel.points_x; ++i) {
+      const int middle = channel.core / 2;
+      const auto scale = static_cast<double>(
+          channel.row_scale[static_cast<std::size_t>(j * channel.points_x + i)]);
+      const auto peak = static_cast<double>(channel.Evaluate(0, i, j, middle, middle));
+      largest = std::max(largest, scale > 0 ? peak / scale : 0);
+    }
+  }
+  int terms = channel.terms;
+  double left_out = 0;
+  while (terms > 1 && largest > 0) {
+    float kernel = 0;
+    for (int k = 0; k < channel.cluster_count; ++k) {
+      kernel = std::max(
+          kernel, LargestOf(channel.Kernel(0, k, terms - 1), channel.KernelSize()));
+    }
+    left_out += static_cast<double>(kernel) *
+                static_cast<double>(
+                    LargestOf(channel.FactorMap(0, terms - 1), channel.MapSize()));
+    if (ErrorOfSum(channel, largest, left_out) > error) {
+      break;
+    }
+    --terms;
+  }
+  factor::Material fewer = channel;
+  fewer.terms = terms;
+  fewer.f.resize(static_cast<std::size_t>(terms * channel.MapSize()));
+  fewer.h.clear();
+  for (int k = 0; k < channel.cluster_count; ++k) {
+    const float* first = channel.Kernel(0, k, 0);
+    fewer.h.insert(fewer.h.end(), first, first + terms * channel.KernelSize());
+  }
+  return fewer;
+}
+
+class MaterialFileSource final : public WindowSource {
+ public:
+  MaterialFileSource(const std::filesystem::path& path, double error)
+      : file_(path), error_(error), channels_(file_.header().channels.size()) {
+    const factor::Material& header = file_.header();
+    points_x = header.points_x;
+    points_y = header.points_y;
+    core = header.core;
+    pitch_mm = header.pitch_mm;
+    eta = header.eta;
+    channels = header.channels;
+    if (header.is_grey) {
+      channels.resize(1);
+    }
+  }
+
+  void EvaluateWindow(int channel, int i, int j, float* window) const override {
+    Of(channel).EvaluateWindow(0, i, j, window);
+  }
+  float Evaluate(int channel, int i, int j, int u, int v) const override {
+    return Of(channel).Evaluate(0, i, j, u, v);
+  }
+  float Albedo(int channel, int i, int j) const override {
+    return Of(channel).albedo[static_cast<std::size_t>(j * points_x + i)];
+  }
+  int channels_read() const override { return file_.channels_read(); }
+  int terms_used() const override { return terms_used_.load(); }
+  int terms_total() const override {
+    return file_.header().terms * static_cast<int>(channels.size());
+  }
+
+ private:
+  struct Channel {
+    std::once_flag read;
+    factor::Material fewer;
+    const factor::Material* used = nullptr;
+  };
+
+  const factor::Material& Of(int channel) const {
+    Channel& kept = channels_[static_cast<std::size_t>(channel)];
+    std::call_once(kept.read, [&] {
+      kept.used = &file_.Channel(channel);
+      if (error_ > 0 && kept.used->form == factor::Form::kSum) {
+        kept.fewer = WithinError(*kept.used, error_);
+        kept.used = &kept.fewer;
+      }
+      terms_used_.fetch_add(kept.used->terms);
+    });
+    return *kept.used;
+  }
+
+  factor::MaterialFile file_;
+  double error_;
+  mutable std::vector<Channel> channels_;
+  mutable std::atomic<int> terms_used_ = 0;
 };
 
 class DatasetSource final : public WindowSource {
@@ -120,6 +242,11 @@ std::shared_ptr<const WindowSource> MakeMaterialSource(
   Expect(material != nullptr, "a source of windows needs a material");
   factor::Validate(*material, "subsurface");
   return std::make_shared<MaterialSource>(std::move(material));
+}
+
+std::shared_ptr<const WindowSource> OpenMaterialSource(
+    const std::filesystem::path& path, double error) {
+  return std::make_shared<MaterialFileSource>(path, error);
 }
 
 std::shared_ptr<const WindowSource> OpenDatasetSource(

@@ -33,11 +33,22 @@ class WindowSource {
   /// Tiles read from file so far, and how many there are; 0 for what is in memory.
   virtual std::int64_t tiles_read() const { return 0; }
   virtual std::int64_t tiles_total() const { return 0; }
+  /// Channels read so far; the terms of a factorization that count in them, and all.
+  virtual int channels_read() const { return static_cast<int>(channels.size()); }
+  virtual int terms_used() const { return 0; }
+  virtual int terms_total() const { return 0; }
 };
 
 /// A factored material.
 std::shared_ptr<const WindowSource> MakeMaterialSource(
     std::shared_ptr<const factor::Material> material);
+
+/// A factored material of which channels are read when they are first asked for. Last
+/// terms of a sum (of SVDs and NMFs) that change R_d by less than `error` of the
+/// channel's largest value are left out, by the product of their largest values. Throws
+/// BadData, also when asked.
+std::shared_ptr<const WindowSource> OpenMaterialSource(
+    const std::filesystem::path& path, double error = 0);
 
 /// A dataset as it was measured, `*.rd.exr`. A slice is read when it is first asked
 /// for, and kept. Throws BadData for a file that can't be read, also when asked.

@@ -53,6 +53,38 @@ TEST_F(IncludeTest, ErrorsNameTheFileTheyAreIn) {
   EXPECT_THAT(ErrorOf("main.xml"), HasSubstr("main.xml:12: no shape 'cub'"));
 }
 
+TEST_F(IncludeTest, ScenesReadNothingOutsideTheirFolder) {
+  std::filesystem::create_directories(folder_ / "scene");
+  Write("secret.xml", "<scene/>");
+  Write("scene/near.xml", "<scene/>");
+  const std::filesystem::path secret = folder_ / "secret.xml";
+  std::filesystem::create_symlink(secret, folder_ / "scene/link.xml");
+  const auto scene = [&](const std::string& file) {
+    Write("scene/main.xml", SceneText("<include filename=\"" + file + "\"/>"));
+    return ErrorOf("scene/main.xml");
+  };
+  EXPECT_EQ(scene("near.xml"), "no error");
+  EXPECT_EQ(scene("../scene/near.xml"), "no error");
+  for (const std::string& file :
+       {std::string("../secret.xml"), secret.string(), std::string("link.xml")}) {
+    EXPECT_THAT(scene(file), HasSubstr("isn't in the scene's folder")) << file;
+    EXPECT_THAT(scene(file), HasSubstr("main.xml:11")) << file;
+    const auto path = folder_ / "scene/main.xml";
+    EXPECT_NO_THROW(ReadScene(path, {.allow_outside = true}));
+    EXPECT_NO_THROW(ReadScene(path, {.defines = {{"by", secret.string()}}}));
+  }
+  // Materials are looked for by name in several folders, but not above these.
+  Write("sample.nacre.exr", "");
+  for (const std::string& name :
+       {std::string("../sample"), (folder_ / "sample.nacre.exr").string()}) {
+    Write("scene/main.xml",
+          SceneText(R"(<shape type="rectangle"><subsurface type="svd">
+            <string name="material" value=")" +
+                    name + "\"/></subsurface></shape>"));
+    EXPECT_THAT(ErrorOf("scene/main.xml"), HasSubstr("isn't in the scene's folder"));
+  }
+}
+
 TEST_F(IncludeTest, RefusesCyclesLongChainsAndASecondSensor) {
   Write("a.xml", "<scene><include filename=\"b.xml\"/></scene>");
   Write("b.xml", "<scene>\n<include filename=\"a.xml\"/></scene>");

@@ -34,13 +34,15 @@ inline std::string SceneText(const std::string& body,
          "\n</scene>\n";
 }
 
-inline Scene Parse(const std::string& xml, const SceneOptions& options = {}) {
+// Files may lie anywhere, as tests have their own folders.
+inline Scene Parse(const std::string& xml,
+                   const SceneOptions& options = {.allow_outside = true}) {
   return ParseScene(xml, "test.xml", ".", options);
 }
 
 /// What the reader says to `xml`, "no error" if nothing.
 inline std::string ReaderError(const std::string& xml,
-                               const SceneOptions& options = {}) {
+                               const SceneOptions& options = {.allow_outside = true}) {
   try {
     Parse(xml, options);
   } catch (const Error& e) {

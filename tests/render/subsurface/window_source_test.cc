@@ -92,6 +92,99 @@ TEST(WindowSourceTest, AScenesMaterialMayBeADataset) {
   EXPECT_EQ(r.summary.use.channels, 3);
 }
 
+Scene UnderLight(const std::filesystem::path& material, const std::string& colour) {
+  return Parse(SceneText(R"(<emitter type="directional">
+      <vector name="direction" x="0" y="0" z="-1"/><rgb name="irradiance" value=")" +
+                         colour + R"("/></emitter>
+    <shape type="rectangle"><subsurface type="svd"><string name="material" value=")" +
+                         material.string() + R"("/></subsurface></shape>)"));
+}
+
+TEST(WindowSourceTest, ChannelsAreReadWhenThereIsLightOfTheirColour) {
+  const nacre::testing::TempFolder folder;
+  factor::Material material = *SmallMaterial();
+  const auto coloured = folder / "coloured.nacre.exr";
+  factor::WriteMaterial(coloured, material);
+  const RenderOptions options{.spp = 4, .thread_count = 1};
+  const Rendering white = Render(UnderLight(coloured, "1"), options);
+  EXPECT_EQ(white.summary.use.channels, 3);
+  EXPECT_EQ(white.summary.use.terms, 3);
+  const Rendering green = Render(UnderLight(coloured, "0 1 0"), options);
+  EXPECT_EQ(green.summary.use.channels, 1);
+  EXPECT_EQ(green.summary.use.terms, 1);
+  EXPECT_EQ(green.summary.use.terms_total, 3);
+  EXPECT_GT(green.summary.use.windows, 0);
+  for (std::size_t i = 0; i < white.image.PixelCount(); ++i) {
+    EXPECT_NEAR(green.image.Channel(1)[i], white.image.Channel(1)[i], 1e-4F);
+    EXPECT_EQ(green.image.Channel(0)[i], 0);
+  }
+
+  // A grey sample has one channel to read, whatever the light.
+  factor::Material grey = OneTermMaterial({8, 9, 0.5}, 1);
+  std::fill(grey.h.begin(), grey.h.end(), 0.01F);
+  SetAlbedo(grey);
+  const auto one = folder / "grey.nacre.exr";
+  factor::WriteMaterial(one, grey);
+  const Rendering r = Render(UnderLight(one, "1 0.5 0.2"), options);
+  EXPECT_EQ(r.summary.use.channels, 1);
+  EXPECT_NEAR(ChannelStatistics(r.image, 1).mean,
+              0.5 * ChannelStatistics(r.image, 0).mean,
+              1e-5);
+}
+
+// Kernels of ever smaller size, in each of the ways that a sum becomes R_d.
+TEST(WindowSourceTest, TermsThatBringLittleAreLeftOut) {
+  const nacre::testing::TempFolder folder;
+  constexpr int kTerms = 6;
+  for (const auto transform : {factor::Transform::kLinear,
+                               factor::Transform::kSqrt,
+                               factor::Transform::kLog}) {
+    factor::Material m = OneTermMaterial({4, 5, 1.0}, 1);
+    m.transform = transform;
+    m.terms = kTerms;
+    m.b = {0.01};
+    m.f.clear();
+    m.h.clear();
+    for (int t = 0; t < kTerms; ++t) {
+      for (int n = 0; n < 16; ++n) {
+        m.f.push_back(t == 0 ? 1 : std::cos(static_cast<float>(n * t)));
+      }
+      for (int n = 0; n < 25; ++n) {
+        m.h.push_back(std::pow(0.1F, static_cast<float>(t)) *
+                      (t == 0 ? 0.3F : std::sin(static_cast<float>(n * t + 1))));
+      }
+    }
+    SetAlbedo(m);
+    const auto path = folder / "terms.nacre.exr";
+    factor::WriteMaterial(path, m);
+    const auto all = OpenMaterialSource(path);
+    double largest = 0;
+    for (int n = 0; n < 16; ++n) {
+      largest =
+          std::max(largest, static_cast<double>(all->Evaluate(0, n % 4, n / 4, 2, 2)));
+    }
+    EXPECT_EQ(all->terms_used(), kTerms);
+    int before = kTerms + 1;
+    for (const double error : {1e-6, 1e-3, 0.3}) {
+      const auto fewer = OpenMaterialSource(path, error);
+      double worst = 0;
+      for (int n = 0; n < 16 * 25; ++n) {
+        const int i = n % 4;
+        const int j = n / 4 % 4;
+        const int u = n / 16 % 5;
+        const int v = n / 80;
+        worst = std::max(worst,
+                         std::abs(static_cast<double>(fewer->Evaluate(0, i, j, u, v) -
+                                                      all->Evaluate(0, i, j, u, v))));
+      }
+      EXPECT_LE(worst, error * largest * 1.0001) << factor::Name(transform) << error;
+      EXPECT_LT(fewer->terms_used(), before);
+      before = fewer->terms_used();
+    }
+    EXPECT_LT(before, 3);
+  }
+}
+
 TEST(MakeFactored, TakesOneOrThreeChannels) {
   factor::Material grey = OneTermMaterial({2, 3, 1.0}, 1);
   std::fill(grey.h.begin(), grey.h.end(), 0.1F);
