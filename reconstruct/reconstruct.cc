@@ -24,7 +24,7 @@ namespace nacre::reconstruct {
 namespace {
 
 // One up whenever the same pictures give other values.
-constexpr int kReconstructionVersion = 4;
+constexpr int kReconstructionVersion = 5;
 
 using internal::GroupPicture;
 using internal::GroupReader;

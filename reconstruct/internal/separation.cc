@@ -78,9 +78,6 @@ struct Separation::Node {
 
 Separation::Node Separation::NodeOf(int u) const {
   constexpr int kStep = 4;
-  if (is_dense_) {
-    return {u, u, 0.0F};
-  }
   const int first = u / kStep * kStep;
   const int next = std::min(first + kStep, header_.core - 1);
   const float second =
@@ -96,21 +93,39 @@ Separation::Foreign Separation::Mix(const Foreign& a, const Foreign& b, float se
           a.hides};
 }
 
-Separation::Foreign Separation::ForeignAt(std::int64_t s,
-                                          int channel,
-                                          int u,
-                                          int v) const {
+Separation::Foreign Separation::Sum(const Foreign& a, const Foreign& b) {
+  return {a.light + b.light,
+          a.variance + b.variance,
+          a.square + b.square,
+          a.hides || b.hides};
+}
+
+Separation::Others Separation::OthersOf(std::int64_t s) const {
+  const int i = static_cast<int>(s % header_.points_x);
+  const int j = static_cast<int>(s / header_.points_x);
+  const int nearby = 2 * header_.core;
+  Others others;
+  for (const acquire::GridIndex& spot :
+       schedule_.Group(group_of_[static_cast<std::size_t>(s)])) {
+    const int apart = std::max(std::abs(spot.i - i), std::abs(spot.j - j));
+    if (apart > 0 && apart <= tails_.Reach() + header_.Radius()) {
+      (apart <= nearby ? others.near : others.far).push_back(spot);
+    }
+  }
+  return others;
+}
+
+Separation::Foreign Separation::ForeignAt(
+    Spots others, std::int64_t s, int channel, int u, int v) const {
   const int radius = header_.Radius();
   const int i = static_cast<int>(s % header_.points_x);
   const int j = static_cast<int>(s / header_.points_x);
   const double inner2 = std::pow(kInner * (radius + 0.5), 2);
   Foreign foreign;
-  for (const acquire::GridIndex& other :
-       schedule_.Group(group_of_[static_cast<std::size_t>(s)])) {
+  for (const acquire::GridIndex& other : others) {
     const int du = i - other.i + u - radius;
     const int dv = j - other.j + v - radius;
-    if ((other.i == i && other.j == j) ||
-        std::max(std::abs(du), std::abs(dv)) > tails_.Reach()) {
+    if (std::max(std::abs(du), std::abs(dv)) > tails_.Reach()) {
       continue;
     }
     const float light = tails_.Extrapolate(other.i, other.j, channel, du, dv);
@@ -169,17 +184,20 @@ Separation::Value Separation::At(std::int64_t s, int channel, int u, int v) cons
   if (!has_tails_) {
     return ValueOf(s, channel, u, v, {});
   }
-  if (is_dense_) {
-    return ValueOf(s, channel, u, v, ForeignAt(s, channel, u, v));
-  }
+  const Others others = OthersOf(s);
   const Node x = NodeOf(u);
   const Node y = NodeOf(v);
   const auto row = [&](int at) {
-    return Mix(ForeignAt(s, channel, x.first, at),
-               ForeignAt(s, channel, x.next, at),
+    return Mix(ForeignAt(others.far, s, channel, x.first, at),
+               ForeignAt(others.far, s, channel, x.next, at),
                x.second);
   };
-  return ValueOf(s, channel, u, v, Mix(row(y.first), row(y.next), y.second));
+  return ValueOf(s,
+                 channel,
+                 u,
+                 v,
+                 Sum(ForeignAt(others.near, s, channel, u, v),
+                     Mix(row(y.first), row(y.next), y.second)));
 }
 
 RdSlice Separation::Slice(std::int64_t s, double* share) const {
@@ -194,12 +212,13 @@ RdSlice Separation::Slice(std::int64_t s, double* share) const {
   const auto node = [&](int u, int v) -> Foreign& {
     return nodes[static_cast<std::size_t>(v * core + u)];
   };
+  const Others others = has_tails_ ? OthersOf(s) : Others{};
   std::size_t at = 0;
   for (int c = 0; c < channels_; ++c) {
     for (int v = 0; has_tails_ && v < core;
          v = v + 1 < core ? NodeOf(v + 1).next : core) {
       for (int u = 0; u < core; u = u + 1 < core ? NodeOf(u + 1).next : core) {
-        node(u, v) = ForeignAt(s, c, u, v);
+        node(u, v) = ForeignAt(others.far, s, c, u, v);
       }
     }
     double total = 0;
@@ -211,8 +230,12 @@ RdSlice Separation::Slice(std::int64_t s, double* share) const {
         const auto row = [&](int line) {
           return Mix(node(x.first, line), node(x.next, line), x.second);
         };
-        const Value value =
-            ValueOf(s, c, u, v, Mix(row(y.first), row(y.next), y.second));
+        const Value value = ValueOf(s,
+                                    c,
+                                    u,
+                                    v,
+                                    Sum(ForeignAt(others.near, s, c, u, v),
+                                        Mix(row(y.first), row(y.next), y.second)));
         slice.valid[at] = value.variance < 0 ? 0 : 1;
         slice.rd[at] = value.rd;
         slice.sigma[at] = value.variance < 0 ? 0.0F : std::sqrt(value.variance);

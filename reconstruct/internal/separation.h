@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 namespace nacre::reconstruct::internal {
@@ -76,8 +77,16 @@ class Separation {
     float square = 0;    // Σ light² of the spots
     bool hides = false;  // the cell is in another spot's inner part
   };
-  Foreign ForeignAt(std::int64_t s, int channel, int u, int v) const;
-  // Of windows that don't overlap it is smooth: bilinear between every fourth cell.
+  // The other spots of a slice's picture. What those nearby shine into a window is
+  // steep; of those farther away it is smooth, and bilinear between every fourth cell.
+  struct Others {
+    std::vector<acquire::GridIndex> near;
+    std::vector<acquire::GridIndex> far;
+  };
+  Others OthersOf(std::int64_t s) const;
+  using Spots = std::span<const acquire::GridIndex>;
+  Foreign ForeignAt(Spots others, std::int64_t s, int channel, int u, int v) const;
+  static Foreign Sum(const Foreign& a, const Foreign& b);
   struct Node;
   Node NodeOf(int u) const;
   static Foreign Mix(const Foreign& a, const Foreign& b, float second);

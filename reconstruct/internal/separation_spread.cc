@@ -43,6 +43,8 @@ void Separation::MeasureSpread() {
     const int i = static_cast<int>(s % header_.points_x);
     const int j = static_cast<int>(s / header_.points_x);
     const auto enter = static_cast<double>(EnterFactor(s, c));
+    Others others = OthersOf(s);
+    others.near.insert(others.near.end(), others.far.begin(), others.far.end());
     for (int v = 0; v < header_.core; ++v) {
       for (int u = 0; u < header_.core; ++u) {
         const double r = std::hypot(u - radius, v - radius);
@@ -54,7 +56,7 @@ void Separation::MeasureSpread() {
         if (r < kInner * (radius + 0.5) || noise < 0 || !(own > 0)) {
           continue;
         }
-        const Foreign other = ForeignAt(s, c, u, v);
+        const Foreign other = ForeignAt(others.near, s, c, u, v);
         if (other.hides) {
           continue;
         }
