@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/exr_guard.h"
 #include "core/exr_reader.h"
 
 #include <OpenEXR/ImfChannelList.h>
@@ -236,6 +237,10 @@ ExrReader::ExrReader(std::filesystem::path path, std::size_t max_bytes)
   if (!std::filesystem::exists(path_)) {
     throw Error("cannot read " + path_.string() + ": there is no such file");
   }
+  CheckExrSizes(path_);
+  // More than what deflate can pack, and half floats become floats.
+  constexpr std::size_t kMaxPacking = 2 * 1032;
+  max_bytes = std::min(max_bytes, kMaxPacking * std::filesystem::file_size(path_));
   try {
     file_ = std::make_unique<File>(path_);
     for (int i = 0; i < file_->file.parts(); ++i) {

@@ -1,5 +1,5 @@
 #include "core/error.h"
-#include "reconstruct/internal/exr_guard.h"
+#include "core/exr_guard.h"
 #include "reconstruct/internal/rd_format.h"
 #include "reconstruct/rd_dataset.h"
 
@@ -159,7 +159,7 @@ RdReader::RdReader(const std::filesystem::path& path) {
   if (!std::filesystem::is_regular_file(path)) {
     throw Error("cannot read " + path.string() + ": there is no such file");
   }
-  internal::CheckExrSizes(path);
+  CheckExrSizes(path);
   Checked(path.string(), "not a readable dataset of R_d", [&] {
     file_ = std::make_unique<File>(path);
   });
