@@ -74,7 +74,7 @@ void Run(const Arguments& arguments) {
     truth = ReadExr(arguments.truth).front();
   } else {
     options.spp = arguments.truth_spp;
-    options.integrator = "fast";
+    options.integrator = arguments.integrator;
     options.points_per_patch = 64;
     options.max_lit_points = 2e7;
     options.lazy = false;
