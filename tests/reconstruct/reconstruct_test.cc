@@ -97,7 +97,7 @@ TEST_F(ReconstructTest, CrosstalkIsTakenAway) {
   const double with = RimError(ReadDataset(Path("plain.rd.exr")), shared->truth);
   const double without = RimError(ReadDataset(Path("clean.rd.exr")), shared->truth);
   EXPECT_GT(with, 0);
-  EXPECT_LT(std::abs(without), 0.35 * with);
+  EXPECT_LT(std::abs(without), 0.2 * with);
 
   const auto log_error = [&](const std::filesystem::path& path) {
     const SliceSource measured = DatasetSource(path);
