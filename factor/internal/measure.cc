@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 #include "factor/internal/material_codes.h"
 #include "factor/internal/reciprocal.h"
+#include "factor/internal/reciprocal_sums.h"
 #include "factor/internal/window_totals.h"
 #include "reconstruct/error_figures.h"
 
@@ -139,24 +140,13 @@ SliceFit WorstOf(const std::vector<SliceFit>& fits) {
 
 // Albedo of all slices of a reciprocal material, and how far their totals are off.
 SliceFit SumAll(const Job& job, Material& m) {
-  const auto window = static_cast<std::size_t>(m.WindowSize());
-  const std::int64_t points = m.PointCount();
-  std::vector<SliceFit> fits(static_cast<std::size_t>(points));
-  ParallelFor(points, job.options.thread_count, [&](std::int64_t point) {
-    std::vector<float> values(window * m.channels.size());
-    const GridIndex index{static_cast<int>(point % m.points_x),
-                          static_cast<int>(point / m.points_x)};
-    ScaledReciprocalWindows(m, index, values.data());
-    for (std::size_t c = 0; c < m.channels.size(); ++c) {
-      const double total =
-          std::accumulate(&values[c * window], &values[c * window] + window, 0.0);
-      const std::size_t at =
-          c * static_cast<std::size_t>(points) + static_cast<std::size_t>(point);
-      m.albedo[at] = RoundAlbedo(total * m.pitch_mm * m.pitch_mm, !m.steps.empty());
-      AddTotal(job.totals[at], total, fits[static_cast<std::size_t>(point)]);
-    }
-  });
-  return WorstOf(fits);
+  const std::vector<double> totals = ReciprocalTotals(m, job.options.thread_count);
+  SliceFit all;
+  for (std::size_t at = 0; at < totals.size(); ++at) {
+    m.albedo[at] = RoundAlbedo(totals[at] * m.pitch_mm * m.pitch_mm, !m.steps.empty());
+    AddTotal(job.totals[at], totals[at], all);
+  }
+  return all;
 }
 
 // row_scale and albedo of all slices by the totals that the fit left.
@@ -194,12 +184,17 @@ void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
   ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t row) {
     const auto r = static_cast<std::size_t>(row);
     const std::int64_t point = job.check.rows[r];
-    std::vector<float> values(window);
+    std::vector<float> windows(window * m.channels.size());
+    const GridIndex index{static_cast<int>(point % m.points_x),
+                          static_cast<int>(point / m.points_x)};
+    if (m.form == Form::kReciprocal) {
+      ScaledReciprocalWindows(m, index, windows.data());
+    }
     for (std::size_t c = 0; c < m.channels.size(); ++c) {
-      m.EvaluateWindow(static_cast<int>(c),
-                       static_cast<int>(point % m.points_x),
-                       static_cast<int>(point / m.points_x),
-                       values.data());
+      const std::span values(&windows[c * window], window);
+      if (m.form != Form::kReciprocal) {
+        m.EvaluateWindow(static_cast<int>(c), index.x, index.y, values.data());
+      }
       const std::size_t offset = (r * m.channels.size() + c) * window;
       const FitError error = ErrorOf(
           {&data.rd[offset], window}, {&data.valid[offset], window}, values, floor);

@@ -83,6 +83,7 @@ bool IsComplete(const reconstruct::RdDataset& dataset) {
 }  // namespace
 
 void LookAtAll(Job& job) {
+  job.source.Know(nullptr, nullptr);
   job.check = {};
   job.totals.clear();
   job.sample = TakeSample(job.source, job.options.sample_rows, job.options.seed);
@@ -97,6 +98,7 @@ void Look(Job& job) {
                            std::max(kSvdSampleRows, job.options.check_slices),
                            job.options.seed);
     if (IsComplete(job.check.dataset)) {
+      job.source.Know(&job.check.rows, &job.check.dataset);
       job.sample = Thin(job.check, job.options.sample_rows);
       job.scans = Scan(*SourceOf(job.check.dataset), job.options.thread_count);
       for (ChannelScan& scan : job.scans) {
@@ -106,6 +108,10 @@ void Look(Job& job) {
     }
   }
   LookAtAll(job);
+}
+
+Job::~Job() {
+  source.Know(nullptr, nullptr);
 }
 
 double Job::Peak() const {

@@ -39,6 +39,7 @@ struct Job {
   Sample check = {};
   std::vector<double> totals = {};  ///< [channel][point] Σ R_d of the slices
 
+  ~Job();
   /// The largest measurement of any channel, mm⁻².
   double Peak() const;
 };

@@ -41,8 +41,6 @@ class WindowTaps {
   std::vector<std::vector<TapPoint>> points_;
 };
 
-constexpr double kMostSide = 1;  // of a logarithm
-
 // Of a map's value at a grid point, or at the nearest point there is.
 std::size_t IndexIn(const Material& m, GridIndex point) {
   const int x = std::clamp(point.x + m.margin, 0, m.MapWidth() - 1);

@@ -3,6 +3,7 @@
 #include "core/parallel.h"
 #include "factor/internal/reciprocal_fit.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "factor/internal/row_streams.h"
 
 #include <Eigen/Cholesky>
 
@@ -120,9 +121,12 @@ Target TargetOf(const ReciprocalData& data,
 Eigen::VectorXd Solve(const Eigen::MatrixXd& design,
                       const Eigen::VectorXd& weight,
                       const Eigen::VectorXd& target) {
-  const Eigen::MatrixXd rooted = weight.cwiseSqrt().asDiagonal() * design;
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(design.cols(), design.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(rooted.transpose());
+  Eigen::MatrixXd normal(design.cols(), design.cols());
+  WeightedGram(design.data(),
+               weight.data(),
+               static_cast<std::size_t>(design.rows()),
+               static_cast<std::size_t>(design.cols()),
+               normal.data());
   const double least = 1e-12 * normal.diagonal().maxCoeff() + 1e-300;
   const Eigen::VectorXd scale = (normal.diagonal().array() + least).rsqrt();
   normal = scale.asDiagonal() * normal * scale.asDiagonal();

@@ -23,11 +23,16 @@ constexpr float kMostChange = 2;  // of a logarithm
 // times what it is: this is what a variance of 1 means in their units.
 constexpr double kPrior = 0.01;
 
-using RowWork = std::function<void(
-    ReciprocalRows& rows, std::size_t pairs, float share, SharedMaps& sum)>;
+// `s` has a number a pair of the row.
+using RowWork = std::function<void(ReciprocalRows& rows,
+                                   std::size_t pairs,
+                                   float share,
+                                   std::vector<float>& s,
+                                   SharedMaps& sum)>;
 
 // Calls `work` for each row of each held offset and channel, `pairs` being where the
-// row's begin, and adds up what it adds to `sum`, of `height` rows.
+// row's begin, and adds up what it adds to `sum`, of `height` rows. Offsets of a group
+// take turns at each row of points, so that the maps' rows stay at hand.
 SharedMaps OverRows(const ReciprocalData& data,
                     const ReciprocalFit& fit,
                     Eigen::Index height,
@@ -37,15 +42,30 @@ SharedMaps OverRows(const ReciprocalData& data,
   ParallelFor(kGroups, thread_count, [&](std::int64_t group) {
     const auto g = static_cast<std::size_t>(group);
     sums[g] = SharedMaps::Zero(height, static_cast<Eigen::Index>(data.Plane()));
+    RowScratch scratch;
+    std::vector<float> s;
+    std::vector<ReciprocalRows> offsets;
     for (std::size_t n = g; n < data.held.size(); n += kGroups) {
       for (std::size_t c = 0; c < data.channels; ++c) {
-        ReciprocalRows rows(data, fit, c, static_cast<std::size_t>(data.held[n]));
-        for (int y = rows.area().y0; y < rows.area().y1; ++y) {
+        const auto cell = static_cast<std::size_t>(data.held[n]);
+        offsets.emplace_back(data, fit, c, cell, scratch);
+      }
+    }
+    for (int y = 0; y < data.height; ++y) {
+      for (std::size_t n = g, at = 0; n < data.held.size(); n += kGroups) {
+        for (std::size_t c = 0; c < data.channels; ++c, ++at) {
+          ReciprocalRows& rows = offsets[at];
+          const PlaneArea& area = rows.area();
+          if (y < area.y0 || y >= area.y1) {
+            continue;
+          }
           rows.Look(y);
+          s.resize(rows.Points());
           work(rows,
                data.HeldOffset(c, n) +
-                   static_cast<std::size_t>(y * data.width + rows.area().x0),
+                   static_cast<std::size_t>(y * data.width + area.x0),
                data.share[n],
+               s,
                sums[g]);
         }
       }
@@ -55,6 +75,31 @@ SharedMaps OverRows(const ReciprocalData& data,
     sums[0] += sums[g];
   }
   return std::move(sums[0]);
+}
+
+__attribute__((target_clones("avx512f", "avx2", "default"))) void Multiply(
+    const float* __restrict by, std::size_t n, float* __restrict s) {
+  for (std::size_t i = 0; i < n; ++i) {
+    s[i] *= by[i];
+  }
+}
+
+// Of models `s`: the weights of their changes and, in their place, what residuals pull
+// with.
+__attribute__((target_clones("avx512f", "avx2", "default"))) void LinearizeRow(
+    const float* __restrict value,
+    const float* __restrict weight,
+    float share,
+    std::size_t n,
+    float* __restrict changes,
+    float* __restrict s) {
+  for (std::size_t i = 0; i < n; ++i) {
+    const float modelled = s[i];
+    const float w = share * weight[i] * modelled;
+    const float most = kMostChange * modelled;
+    changes[i] = w * modelled;
+    s[i] = w * std::min(std::max(value[i] - modelled, -most), most);
+  }
 }
 
 // The weights of changes of the logarithm, and what residuals pull with.
@@ -68,25 +113,25 @@ Linearized Linearize(const ReciprocalData& data,
                      int thread_count) {
   Linearized result;
   result.weight.assign(data.pairs.value.size(), 0.0F);
-  result.pull = OverRows(
-      data,
-      fit,
-      fit.f.rows(),
-      thread_count,
-      [&](ReciprocalRows& rows, std::size_t at, float share, SharedMaps& sum) {
-        const std::size_t n = rows.Points();
-        std::vector<float> s(n);
-        rows.Model(s.data());
-        for (std::size_t i = 0; i < n; ++i) {
-          const float modelled = std::exp(std::min(s[i], static_cast<float>(kMostLog)));
-          const float weight = share * data.pairs.weight[at + i] * modelled;
-          result.weight[at + i] = weight * modelled;
-          s[i] = weight * std::clamp(data.pairs.value[at + i] - modelled,
-                                     -kMostChange * modelled,
-                                     kMostChange * modelled);
-        }
-        rows.Back(s.data(), sum);
-      });
+  result.pull = OverRows(data,
+                         fit,
+                         fit.f.rows(),
+                         thread_count,
+                         [&](ReciprocalRows& rows,
+                             std::size_t at,
+                             float share,
+                             std::vector<float>& s,
+                             SharedMaps& sum) {
+                           rows.Model(s.data());
+                           ExpRow(static_cast<float>(kMostLog), s.size(), s.data());
+                           LinearizeRow(&data.pairs.value[at],
+                                        &data.pairs.weight[at],
+                                        share,
+                                        s.size(),
+                                        &result.weight[at],
+                                        s.data());
+                           rows.Back(s.data(), sum);
+                         });
   return result;
 }
 
@@ -99,14 +144,15 @@ class Preconditioner {
                  int thread_count)
       : terms_(fit.f.rows()),
         thread_count_(thread_count),
-        blocks_(
-            OverRows(data,
-                     fit,
-                     terms_ * (terms_ + 1) / 2,
-                     thread_count,
-                     [&](ReciprocalRows& rows, std::size_t at, float, SharedMaps& sum) {
-                       rows.Blocks(&weight[at], sum);
-                     })) {
+        blocks_(OverRows(data,
+                         fit,
+                         terms_ * (terms_ + 1) / 2,
+                         thread_count,
+                         [&](ReciprocalRows& rows,
+                             std::size_t at,
+                             float,
+                             std::vector<float>&,
+                             SharedMaps& sum) { rows.Blocks(&weight[at], sum); })) {
     ParallelForBlocks(
         blocks_.cols(), 4096, thread_count, [&](std::int64_t p0, std::int64_t p1) {
           for (std::int64_t p = p0; p < p1; ++p) {
@@ -175,12 +221,13 @@ MapChange MapStep(const ReciprocalData& data,
                     fit,
                     fit.f.rows(),
                     thread_count,
-                    [&](ReciprocalRows& rows, std::size_t at, float, SharedMaps& sum) {
-                      std::vector<float> s(rows.Points());
+                    [&](ReciprocalRows& rows,
+                        std::size_t at,
+                        float,
+                        std::vector<float>& s,
+                        SharedMaps& sum) {
                       rows.Along(change, s.data());
-                      for (std::size_t i = 0; i < s.size(); ++i) {
-                        s[i] *= linear.weight[at + i];
-                      }
+                      Multiply(&linear.weight[at], s.size(), s.data());
                       rows.Back(s.data(), sum);
                     });
   };
@@ -212,8 +259,10 @@ void SetHeldWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData& 
   ParallelFor(std::ssize(data.held), thread_count, [&](std::int64_t held) {
     const auto n = static_cast<std::size_t>(held);
     std::vector<float> s;
+    RowScratch scratch;
     for (std::size_t c = 0; c < data.channels; ++c) {
-      ReciprocalRows rows(data, fit, c, static_cast<std::size_t>(data.held[n]));
+      ReciprocalRows rows(
+          data, fit, c, static_cast<std::size_t>(data.held[n]), scratch);
       s.resize(rows.Points());
       for (int y = rows.area().y0; y < rows.area().y1; ++y) {
         rows.Look(y);

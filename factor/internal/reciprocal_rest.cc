@@ -63,9 +63,11 @@ Whitened Whiten(const ReciprocalData& data,
     const auto n = static_cast<std::size_t>(held);
     std::vector<float> s;
     std::vector<float> added;
+    RowScratch scratch;
     for (std::size_t c = 0; c < data.channels; ++c) {
       const auto unit = static_cast<float>(1 / NoiseOf(data, c, data.held[n]));
-      ReciprocalRows rows(data, fit, c, static_cast<std::size_t>(data.held[n]));
+      ReciprocalRows rows(
+          data, fit, c, static_cast<std::size_t>(data.held[n]), scratch);
       s.resize(rows.Points());
       for (int y = rows.area().y0; y < rows.area().y1; ++y) {
         rows.Look(y);

@@ -17,6 +17,9 @@ struct TapPoint {
 /// peaks.
 inline constexpr double kMostLog = 1.0986;
 
+/// And logarithms of what sides make of it, either way.
+inline constexpr double kMostSide = 1;
+
 /// Most taps of a reciprocal material: the ends, the middle, the quarters, the eighths.
 inline constexpr int kMostTaps = 4;
 

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "factor/internal/reciprocal.h"
+#include "factor/internal/reciprocal_sums.h"
 
 #include <algorithm>
 #include <cmath>
@@ -103,26 +104,6 @@ void Spread(const Material& m, std::int64_t point, std::vector<std::uint8_t>& ma
   }
 }
 
-// Of all slices: [channel][point].
-std::vector<double> Totals(const Material& m, int thread_count) {
-  const auto points = static_cast<std::size_t>(m.PointCount());
-  const auto window = static_cast<std::size_t>(m.WindowSize());
-  std::vector<double> totals(m.channels.size() * points);
-  ParallelFor(m.PointCount(), thread_count, [&](std::int64_t p) {
-    std::vector<float> values(window * m.channels.size());
-    ScaledReciprocalWindows(
-        m,
-        {static_cast<int>(p % m.points_x), static_cast<int>(p / m.points_x)},
-        values.data());
-    for (std::size_t c = 0; c < m.channels.size(); ++c) {
-      const float* first = &values[c * window];
-      totals[c * points + static_cast<std::size_t>(p)] =
-          std::accumulate(first, first + window, 0.0);
-    }
-  });
-  return totals;
-}
-
 // `totals` are those to begin with.
 void BalanceChannel(const Job& job,
                     int channel,
@@ -175,7 +156,7 @@ void BalanceTotals(Job& job, double bound, Material& m) {
   }
   const std::vector<Interval> wanted =
       Wanted(job, std::max(bound - static_cast<double>(step), 0.0), m);
-  const std::vector<double> totals = Totals(m, job.options.thread_count);
+  const std::vector<double> totals = ReciprocalTotals(m, job.options.thread_count);
   for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
     const auto first = static_cast<std::size_t>(c * m.PointCount());
     BalanceChannel(job, c, &totals[first], &wanted[first], step, m);

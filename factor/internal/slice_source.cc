@@ -67,6 +67,15 @@ class FileSource : public SliceSource {
     return {first, count, now_.rd.data(), now_.valid.data(), now_.sigma.data()};
   }
 
+  void Know(const std::vector<std::int64_t>* rows,
+            const reconstruct::RdDataset* dataset) override {
+    if (ahead_.valid()) {
+      ahead_.wait();  // it may be looking
+    }
+    known_rows_ = rows;
+    known_ = dataset;
+  }
+
  private:
   struct Block {
     std::int64_t first = 0;
@@ -84,6 +93,9 @@ class FileSource : public SliceSource {
     block.sigma.resize(block.rd.size());
     for (std::int64_t s = 0; s < count; ++s) {
       const std::int64_t n = first + s;
+      if (CopyKnown(n, s * size, block)) {
+        continue;
+      }
       const reconstruct::RdSlice slice =
           reader_.ReadSlice(static_cast<int>(n % header().points_x),
                             static_cast<int>(n / header().points_x));
@@ -95,7 +107,29 @@ class FileSource : public SliceSource {
     block.count = count;
   }
 
+  // Whether slice n is known; if so, it is put there.
+  bool CopyKnown(std::int64_t n, std::int64_t to, Block& block) const {
+    if (known_rows_ == nullptr) {
+      return false;
+    }
+    const auto found = std::lower_bound(known_rows_->begin(), known_rows_->end(), n);
+    if (found == known_rows_->end() || *found != n) {
+      return false;
+    }
+    const std::int64_t size = header().SliceSize();
+    const std::int64_t from = (found - known_rows_->begin()) * size;
+    const auto copy = [&](const auto& values, auto& target) {
+      std::copy_n(values.begin() + from, size, target.begin() + to);
+    };
+    copy(known_->rd, block.rd);
+    copy(known_->valid, block.valid);
+    copy(known_->sigma, block.sigma);
+    return true;
+  }
+
   reconstruct::RdReader& reader_;
+  const std::vector<std::int64_t>* known_rows_ = nullptr;
+  const reconstruct::RdDataset* known_ = nullptr;
   Block now_;
   Block next_;
   std::future<void> ahead_;  // last: it is waited for before the blocks go
