@@ -1,29 +1,11 @@
 #pragma once
 
 #include "calibrate/corrections.h"
+#include "reconstruct/internal/binned_picture.h"
 
 #include <vector>
 
 namespace nacre::reconstruct::internal {
-
-/// Sums of a picture over boxes of kSide × kSide pixels, those at the right and lower
-/// rim smaller.
-struct BinnedPicture {
-  static constexpr int kSide = 2;
-  BinnedPicture(int picture_width, int picture_height)
-      : width((picture_width + kSide - 1) / kSide),
-        height((picture_height + kSide - 1) / kSide),
-        values(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)) {}
-  static BinnedPicture OfSize(int width, int height) {
-    return {kSide * width, kSide * height};
-  }
-  /// Overwrites the sums with those of `picture`.
-  void Fill(const std::vector<float>& picture, int picture_width);
-
-  int width;
-  int height;
-  std::vector<float> values;
-};
 
 /// Glare on a picture, to be taken away: (1 − g) I + K ∗ I = seen (calibrate/glare.h)
 /// is solved by I = seen / (1 − g) − C ∗ seen. C is smooth but for its hole, so that a
