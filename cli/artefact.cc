@@ -60,6 +60,8 @@ const char* Name(ArtefactKind kind) {
       return "PNG picture";
     case ArtefactKind::kSession:
       return "session";
+    case ArtefactKind::kPreset:
+      return "preset";
     case ArtefactKind::kCalibration:
       return "calibration";
     case ArtefactKind::kPhantom:
@@ -92,8 +94,9 @@ ArtefactKind DetectKind(const std::filesystem::path& path) {
     throw Error("cannot read " + path.string() + ": there is no such file or folder");
   }
   if (std::filesystem::is_directory(path)) {
-    return std::filesystem::exists(path / "session.json") ? ArtefactKind::kSession
-                                                          : ArtefactKind::kUnknown;
+    return std::filesystem::exists(path / "session.json")  ? ArtefactKind::kSession
+           : std::filesystem::exists(path / "preset.toml") ? ArtefactKind::kPreset
+                                                           : ArtefactKind::kUnknown;
   }
   const std::string head = Head(path, kHeadBytes);
   if (head.starts_with("\x76\x2f\x31\x01")) {

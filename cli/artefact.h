@@ -12,6 +12,7 @@ enum class ArtefactKind {
   kExrPicture,  ///< any other OpenEXR file
   kPngPicture,
   kSession,      ///< a folder with session.json
+  kPreset,       ///< a folder with preset.toml
   kCalibration,  ///< calibration.json
   kPhantom,      ///< TOML with [slab]
   kRig,          ///< TOML with [scanner]

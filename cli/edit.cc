@@ -7,6 +7,9 @@
 #include "core/error.h"
 #include "core/png.h"
 #include "core/provenance.h"
+#ifdef NACRE_HAS_PRESETS
+#include "cli/preset/preset.h"
+#endif
 
 #include <cmath>
 #include <filesystem>
@@ -124,7 +127,13 @@ std::string ProvenanceOf(const Arguments& arguments) {
   return provenance.ToString();
 }
 
-int Run(const Arguments& arguments, const Common& common) {
+int Run(Arguments& arguments, const Common& common) {
+#ifdef NACRE_HAS_PRESETS
+  arguments.file = preset::MaterialPath(arguments.file);
+  if (!arguments.mix.empty()) {
+    arguments.mix = preset::MaterialPath(arguments.mix);
+  }
+#endif
   const ProgressFunction progress = ConsoleProgress(common);
   const auto sample = view::OpenSample(arguments.file, progress);
   const reconstruct::SliceSource source = SourceOf(*sample);
@@ -163,7 +172,8 @@ int Run(const Arguments& arguments, const Common& common) {
 
 std::function<int()> MakeEditVerb(CLI::App& app, const Common& common) {
   auto arguments = std::make_shared<Arguments>();
-  app.add_option("file", arguments->file, "a dataset or a material")->required();
+  app.add_option("file", arguments->file, "a dataset, a material or a preset")
+      ->required();
   app.add_option("-o,--out", arguments->out, "dataset to write, *.rd.exr")->required();
   app.add_option("--albedo",
                  arguments->albedo,

@@ -9,6 +9,9 @@
 #include "factor/factor.h"
 #include "factor/sss.h"
 #endif
+#ifdef NACRE_HAS_PRESETS
+#include "cli/preset/preset.h"
+#endif
 
 #include <filesystem>
 #include <memory>
@@ -18,20 +21,33 @@ namespace {
 
 struct Arguments {
   std::filesystem::path file;
+  std::string name;  ///< of the file, or of the preset that it belongs to
   std::string to;
   std::filesystem::path out;
   reconstruct::ExportOptions options;
 };
 
 int ToPsf(const Arguments& args, const Common& common) {
+  if (DetectKind(args.file) == ArtefactKind::kMaterial) {
+    throw UsageError(
+        fmt::format("--to psf takes a dataset; 'nacre edit {} --out "
+                    "x.rd.exr' makes one of a material",
+                    args.name));
+  }
   const reconstruct::ExportSummary summary = reconstruct::ExportPsf(
       args.file, args.out, args.options, ConsoleProgress(common));
+  constexpr const char* kLost =
+      "pitch, refractive index, names of channels, noise, which values are valid";
   Say(common, "exported " + args.file.string() + ": " + summary.Brief());
+  Say(common, std::string("lost: ") + kLost);
   Print(common,
         Json{{"file", args.out.string()},
              {"bytes", summary.bytes},
              {"clamped", summary.clamped_count},
-             {"invalid", summary.invalid_count}},
+             {"invalid", summary.invalid_count},
+             {"unit", "R_d in mm^-2, means over cells"},
+             {"residual", 0},
+             {"lost", kLost}},
         args.out.string());
   return 0;
 }
@@ -57,12 +73,19 @@ int ToSss(const Arguments& args, const Common& common) {
     material = std::move(fitted.material);
   }
   const std::int64_t bytes = factor::WriteSss(args.out, material);
-  Say(common, "lost: pitch, refractive index, what lies beyond the grid");
-  Print(
-      common,
-      Json{
-          {"file", args.out.string()}, {"bytes", bytes}, {"gaussians", material.terms}},
-      args.out.string());
+  constexpr const char* kLost =
+      "pitch, refractive index, what lies beyond the grid; R_d as sums of Gaussians";
+  Say(common, std::string("lost: ") + kLost);
+  Json json{{"file", args.out.string()},
+            {"bytes", bytes},
+            {"gaussians", material.terms},
+            {"unit", "R_d per cell of pitch^2, lengths in pitches"},
+            {"lost", kLost}};
+  if (const auto error = material.error.find("relative_l2");
+      error != material.error.end()) {
+    json["residual"] = error->second;
+  }
+  Print(common, json, args.out.string());
   return 0;
 }
 
@@ -79,14 +102,8 @@ exchange::ProfileFit Fit(const std::filesystem::path& file, const Common& common
 int ToRenderer(const exchange::Target& target,
                const Arguments& args,
                const Common& common) {
-  // A preset's folder stands for its material.
-  const bool preset = std::filesystem::is_directory(args.file);
-  const std::filesystem::path file =
-      preset ? args.file / "material.nacre.exr" : args.file;
-  const exchange::ProfileFit fit = Fit(file, common);
-  const std::string source =
-      (preset ? args.file : file).lexically_normal().filename().string();
-  Json json = exchange::ExportMaps(target, fit, source, args.out);
+  const exchange::ProfileFit fit = Fit(args.file, common);
+  Json json = exchange::ExportMaps(target, fit, args.name, args.out);
   json["out"] = args.out.string();
   Say(common, "fit: " + fit.summary.Brief());
   Say(common, std::string("lost: ") + target.lost);
@@ -96,7 +113,11 @@ int ToRenderer(const exchange::Target& target,
 
 #endif
 
-int Run(const Arguments& args, const Common& common) {
+int Run(Arguments& args, const Common& common) {
+  args.name = args.file.lexically_normal().filename().string();
+#ifdef NACRE_HAS_PRESETS
+  args.file = preset::MaterialPath(args.file);
+#endif
   if (args.to == "psf") {
     return ToPsf(args, common);
   }
@@ -120,8 +141,9 @@ int Run(const Arguments& args, const Common& common) {
 
 std::function<int()> MakeExportVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
-  app.add_option(
-         "file", args->file, "dataset, *.rd.exr; to sss and renderers also *.nacre.exr")
+  app.add_option("file",
+                 args->file,
+                 "dataset, *.rd.exr; to sss and renderers also *.nacre.exr or a preset")
       ->required();
   app.add_option(
          "--to",

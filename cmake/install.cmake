@@ -33,7 +33,7 @@ if(TARGET nacre)
   endif()
   install(DIRECTORY presets/ DESTINATION ${CMAKE_INSTALL_DATADIR}/nacre/presets
     COMPONENT presets PATTERN phantoms EXCLUDE PATTERN README.md EXCLUDE)
-  install(DIRECTORY blender/nacre DESTINATION ${CMAKE_INSTALL_DATADIR}/blender/scripts/addons
+  install(DIRECTORY blender/nacre_blender DESTINATION ${CMAKE_INSTALL_DATADIR}/blender/scripts/addons
     COMPONENT blender PATTERN __pycache__ EXCLUDE)
 endif()
 if(TARGET nacre_acquire)

@@ -21,7 +21,7 @@ root=$scratch/root/usr
 export PATH=$root/bin:$PATH
 nacre --version
 nacre preset list --json --quiet | grep -q SVD_S10_Chess8x8
-for file in nacre-factor.1.gz completions/nacre addons/nacre/__init__.py rigs/gige-helios.toml \
+for file in nacre-factor.1.gz completions/nacre addons/nacre_blender/__init__.py rigs/gige-helios.toml \
   nacre/nacreConfig.cmake; do
   find "$root" -path "*/$file" | grep -q . || { echo "no $file in the packages" >&2; exit 1; }
 done

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/json.h"
+#include "render/preset_path.h"
 
 #include <algorithm>
 #include <set>
@@ -42,6 +43,14 @@ std::int64_t Preset::Bytes() const {
     bytes += static_cast<std::int64_t>(fs::file_size(folder / file));
   }
   return bytes;
+}
+
+fs::path MaterialPath(const fs::path& path) {
+  if (fs::is_regular_file(path / "preset.toml")) {
+    return ReadPreset(path).File("material");
+  }
+  const bool is_name = !fs::exists(path) && !path.has_extension();
+  return is_name ? render::FindPreset(path.string(), "") : path;
 }
 
 std::vector<Preset> FindPresets(const std::vector<fs::path>& folders,

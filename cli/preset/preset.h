@@ -47,6 +47,10 @@ void CheckName(const std::string& name);
 /// file:line, also for names that lead out of the folder.
 Preset ReadPreset(const std::filesystem::path& folder);
 
+/// The material of a preset, if `path` is a preset's folder, or no file but the name of
+/// a preset that scenes would find (render/preset_path.h); else `path` itself.
+std::filesystem::path MaterialPath(const std::filesystem::path& path);
+
 /// Writes preset.folder/preset.toml, with the hashes of the files that are there.
 void WritePreset(Preset& preset);
 

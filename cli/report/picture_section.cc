@@ -89,7 +89,9 @@ std::string PictureFigure(const std::filesystem::path& path,
 }
 
 std::string PictureSection(const std::filesystem::path& path) {
-  return Section("Picture", "", PictureFigure(path, ""));
+  const std::string stats =
+      IsPng(path) ? "" : PictureStats(ReadExr(path, std::size_t{2} << 30));
+  return Section("Picture", "", PictureFigure(path, "") + stats);
 }
 
 int ChannelColor(const std::string& name, std::size_t index) {

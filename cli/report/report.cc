@@ -3,6 +3,9 @@
 #include "cli/artefact.h"
 #include "cli/report/html.h"
 #include "cli/report/sections.h"
+#ifdef NACRE_HAS_PRESETS
+#include "cli/preset/preset.h"
+#endif
 #include "core/error.h"
 #include "core/json.h"
 
@@ -37,6 +40,7 @@ int Rank(ArtefactKind kind) {
     case ArtefactKind::kDataset:
       return 2;
     case ArtefactKind::kMaterial:
+    case ArtefactKind::kPreset:
       return 3;
     default:
       return 4;
@@ -97,6 +101,10 @@ std::string SectionOn(const Found& found,
       return DatasetSection(found.path, brief, progress);
     case ArtefactKind::kMaterial:
       return MaterialSection(found.path);
+#ifdef NACRE_HAS_PRESETS
+    case ArtefactKind::kPreset:
+      return PresetSection(found.path);
+#endif
     case ArtefactKind::kSession:
       return SessionSection(found.path);
     case ArtefactKind::kCalibration:
@@ -107,7 +115,7 @@ std::string SectionOn(const Found& found,
     default:
       throw BadData(
           fmt::format("{}: is of a kind ({}) that there is no report on; datasets, "
-                      "materials, pictures, "
+                      "materials, presets, pictures, "
                       "sessions, calibrations and folders of them have one",
                       found.path.string(),
                       Name(found.kind)));
@@ -166,11 +174,16 @@ std::string FolderReport(const fs::path& folder, const ProgressFunction& progres
 
 }  // namespace
 
-std::string BuildReport(const fs::path& path, const ProgressFunction& progress) {
-  const ArtefactKind kind = fs::is_directory(path) && !fs::exists(path / "session.json")
-                                ? ArtefactKind::kUnknown
-                                : DetectKind(path);
-  if (fs::is_directory(path) && kind != ArtefactKind::kSession) {
+std::string BuildReport(const fs::path& named, const ProgressFunction& progress) {
+  fs::path path = named;
+#ifdef NACRE_HAS_PRESETS
+  if (!fs::exists(path)) {  // a preset's name, perhaps
+    path = preset::MaterialPath(named);
+    path = path == named ? named : path.parent_path();
+  }
+#endif
+  const ArtefactKind kind = DetectKind(path);
+  if (fs::is_directory(path) && kind == ArtefactKind::kUnknown) {
     return FolderReport(path, progress);
   }
   return Page("Nacre report: " + path.filename().string(),

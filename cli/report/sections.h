@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/exr.h"
 #include "core/json_fwd.h"
 #include "core/progress.h"
 
@@ -15,6 +16,8 @@ std::string DatasetSection(const std::filesystem::path& path,
                            bool brief,
                            const ProgressFunction& progress);
 std::string MaterialSection(const std::filesystem::path& path);
+/// A preset's folder: what it says of itself, whether it is whole, and its material.
+std::string PresetSection(const std::filesystem::path& folder);
 std::string SessionSection(const std::filesystem::path& folder);
 std::string CalibrationSection(const std::filesystem::path& path);
 /// Warnings and figures of a calibration, for its section; empty if this build was made
@@ -25,6 +28,10 @@ std::string CalibrationFigures(const std::filesystem::path& path);
 std::string PictureSection(const std::filesystem::path& path);
 std::string PictureFigure(const std::filesystem::path& path,
                           const std::string& css_class);
+
+/// Figures on an OpenEXR picture: its channels, the noise that its variance tells,
+/// where its samples went, how it was made.
+std::string PictureStats(const std::vector<ExrPart>& parts);
 
 /// The table of time, memory and error from stages.json; `json` is that file's content,
 /// `origin` its name for messages.

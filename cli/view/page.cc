@@ -35,10 +35,11 @@ its slice</label>
 <output id="ev-stops"></output></label>
 <label id="with-terms" hidden>terms<input type="range" id="terms" min="1" max="1" value="1">
 <output id="terms-error"></output></label>
+<svg id="curve" viewBox="0 0 520 150" hidden></svg>
 </section><section id="slice-section"><h2>Slice R_d(x_i, d), mm⁻², logarithmic</h2>
 <div id="where"></div><div class="row" id="slices"></div>
 <h2>Mean on rings of |d|</h2><svg id="profile" viewBox="0 0 520 240"></svg>
-<h2 id="residual-title"></h2><div class="row" id="residuals"></div></section>
+<h2 id="residual-title"></h2><div id="residual-l2"></div><div class="row" id="residuals"></div></section>
 <section id="factors" hidden><h2>Kernels</h2><div class="row sheet" id="kernels"></div>
 <h2>Factor maps</h2><div class="row sheet" id="maps"></div></section></main>
 <main id="of-session" hidden><section><label>picture<input type="range" id="picture" min="0"
@@ -152,7 +153,24 @@ function showSlice(s) {
     at('residual-' + c.name).title = `${c.name}: ${three(100 * Math.sqrt(sum / weight))} % (L2)`;
     at('residual-' + c.name).dataset.l2 = Math.sqrt(sum / weight);
   });
+  say('residual-l2', 'off by ' + s.channels.map(c => `${c.name} ${
+    three(100 * at('residual-' + c.name).dataset.l2)} %`).join(', ') + ' (relative L2)');
   plot(curves);
+}
+// The error of the first S terms, against S; a dot at the slider's.
+function curve() {
+  const known = state.error_curve, n = known.length, last = known[n - 1].terms;
+  const e = known.map(p => Math.log10(p.relative_l2)), top = Math.max(...e), low = Math.min(...e);
+  const X = s => 60 + 440 * (s - 1) / Math.max(1, last - 1);
+  const Y = v => 15 + 100 * (top - v) / Math.max(top - low, 1e-9);
+  const line = known.map((p, k) => `${X(p.terms)},${Y(e[k])}`).join(' ');
+  const now = known.findIndex(p => p.terms >= terms()), k = now < 0 ? n - 1 : now;
+  const percent = v => three(100 * 10 ** v) + ' %';
+  at('curve').innerHTML = `<polyline points="${line}" fill="none" stroke="#6aa7ff"/>
+    <circle cx="${X(known[k].terms)}" cy="${Y(e[k])}" r="4" fill="#e3c567"/>
+    <text x="4" y="19">${percent(top)}</text><text x="4" y="119">${percent(low)}</text>
+    <text x="56" y="140">1</text><text x="488" y="140">${last}</text>
+    <text x="210" y="140">terms S; error, relative L2</text>`;
 }
 const terms = () => at('with-terms').hidden ? 0 : Number(at('terms').value);
 function askSlice() {
@@ -184,6 +202,7 @@ function sliders() {
   say('ev-stops', at('ev').value + ' stops');
   if (at('with-terms').hidden) { return; }
   const known = state.error_curve.find(e => e.terms === terms());
+  if (!at('curve').hasAttribute('hidden')) { curve(); }
   say('terms-error', terms() + (known ? `, error ${three(100 * known.relative_l2)} %` : ''));
 }
 function mode() {
@@ -214,6 +233,7 @@ function openSample() {
       ? `, relative L2 error ${three(100 * e.relative_l2)} %` : '') +
       (state.preset ? `, ${state.preset.licence}` : ''));
     at('with-terms').hidden = !state.sums_terms || state.terms < 2;
+    at('curve').toggleAttribute('hidden', at('with-terms').hidden || !state.error_curve.length);
     at('terms').max = state.terms;
     at('terms').value = state.terms;
     at('factors').hidden = false;

@@ -3,8 +3,8 @@
 #include "cli/artefact.h"
 #include "cli/view/page.h"
 #include "core/error.h"
-#ifdef NACRE_HAS_RENDER
-#include "render/preset_path.h"
+#ifdef NACRE_HAS_PRESETS
+#include "cli/preset/preset.h"
 #endif
 
 namespace nacre::cli::view {
@@ -13,12 +13,10 @@ namespace {
 std::map<std::string, web::Handler> RoutesOf(const std::filesystem::path& path,
                                              const std::filesystem::path& against,
                                              const ProgressFunction& progress) {
-#ifdef NACRE_HAS_RENDER
-  if (!std::filesystem::exists(path) && !path.has_extension()) {  // a preset's name
-    return PresetView(render::FindPreset(path.string(), "").parent_path(), against);
-  }
-  if (std::filesystem::is_regular_file(path / "preset.toml")) {
-    return PresetView(path, against);
+#ifdef NACRE_HAS_PRESETS
+  const std::filesystem::path material = preset::MaterialPath(path);
+  if (std::filesystem::exists(material.parent_path() / "preset.toml")) {
+    return PresetView(material.parent_path(), against);
   }
 #endif
 #ifdef NACRE_HAS_ACQUIRE

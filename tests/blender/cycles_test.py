@@ -91,7 +91,7 @@ def cycles_edge(name, method):
 
 
 support.install()
-from nacre import cycles_material  # noqa: E402
+from nacre_blender import cycles_material  # noqa: E402
 
 for name, method in (("marble", "BURLEY"), ("skin", "BURLEY"), ("milk", "BURLEY"),
                      ("marble", "RANDOM_WALK")):

@@ -9,7 +9,7 @@ import support
 from support import check
 
 support.install()
-from nacre import engine, log, process  # noqa: E402
+from nacre_blender import engine, log, process  # noqa: E402
 
 COMMAND = os.environ["NACRE"]
 support.empty_scene()

@@ -12,7 +12,7 @@ models = [item.identifier for item in
 check(models == ["OPAQUE", "MEDIUM", "DIPOLE", "SVD"], "the menu is the thesis'")
 check("NACRE" in bpy.types.MATERIAL_PT_custom_props.COMPAT_ENGINES, "Blender's panels stay")
 
-from nacre import presets  # noqa: E402  (only there once it is installed)
+from nacre_blender import presets  # noqa: E402  (only there once it is installed)
 
 names = sorted(presets.all_presets())
 check(len(names) >= 6, "%d presets are found" % len(names))
@@ -23,10 +23,10 @@ settings.preset = "leaf"
 check(settings.preset == "leaf", "a preset can be picked")
 
 bpy.ops.wm.save_userpref()
-bpy.ops.preferences.addon_disable(module="nacre")
+bpy.ops.preferences.addon_disable(module="nacre_blender")
 check(not hasattr(bpy.types, "NACRE_PT_material"), "disabled, it is gone")
 check(not hasattr(bpy.types.Material, "nacre"), "and its properties with it")
 check("NACRE" not in bpy.types.MATERIAL_PT_custom_props.COMPAT_ENGINES, "and its name")
-bpy.ops.preferences.addon_enable(module="nacre")
+bpy.ops.preferences.addon_enable(module="nacre_blender")
 check(bpy.context.object.active_material.nacre.model == "SVD", "enabled again, settings are kept")
 support.done()

@@ -65,7 +65,7 @@ check(0.9 < ratio < 1.1, "dipole and medium send back alike (%.3f)" % ratio)
 # A file instead of a preset is the same material.
 measured = support.translucent("SVD")
 measured.nacre.source = "FILE"
-from nacre import presets  # noqa: E402
+from nacre_blender import presets  # noqa: E402
 
 preset = presets.all_presets()["SVD_S10_Chess8x8"]
 measured.nacre.file = preset["folder"] + "/" + preset["files"]["material"]

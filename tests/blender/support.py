@@ -25,7 +25,7 @@ def nacre(*arguments):
 
 def install():
     bpy.ops.preferences.addon_install(filepath=os.environ["NACRE_TEST_ZIP"])
-    bpy.ops.preferences.addon_enable(module="nacre")
+    bpy.ops.preferences.addon_enable(module="nacre_blender")
     bpy.context.scene.render.engine = "NACRE"
 
 

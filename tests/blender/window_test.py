@@ -14,7 +14,7 @@ TICK_S = 0.2
 
 bpy.context.preferences.view.show_splash = False
 support.install()
-from nacre import engine, panels  # noqa: E402
+from nacre_blender import engine, panels  # noqa: E402
 
 pictures = []  # that the viewport read: their mean colours
 models = []  # that the panel was drawn for

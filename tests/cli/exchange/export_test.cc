@@ -111,6 +111,23 @@ TEST_F(Export, MitsubaGetsTheMeanAsAMedium) {
   EXPECT_THAT(json.at("lost").get<std::string>(), HasSubstr("texture"));
 }
 
+TEST_F(Export, EachStatesUnitResidualAndLoss) {
+  for (const char* target : {"psf", "sss"}) {
+    const Json json = To(target);
+    EXPECT_THAT(json.at("unit").get<std::string>(), HasSubstr("R_d")) << target;
+    EXPECT_LT(json.at("residual").get<double>(), 0.1) << target;
+    EXPECT_THAT(json.at("lost").get<std::string>(), HasSubstr("pitch")) << target;
+  }
+  for (const char* target :
+       {"cycles", "pbrt-v4", "mtlx", "renderman", "appleseed", "mitsuba3"}) {
+    To(target);
+    const Json json = ReadJson(folder_ / target / "export.json");
+    EXPECT_THAT(json.at("units").get<std::string>(), HasSubstr("millimetres"));
+    EXPECT_LT(json.at("fit").at("mean_residual").get<double>(), 0.02) << target;
+    EXPECT_THAT(json.at("lost").get<std::string>(), HasSubstr("profile")) << target;
+  }
+}
+
 TEST_F(Export, RefusesWhatItDoesntKnow) {
   EXPECT_THAT(testing::ErrorMessage([&] { To("arnold"); }, ExitCode::kUsage),
               HasSubstr("psf, sss, cycles, pbrt-v4"));

@@ -12,6 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 namespace nacre::cli::report {
 namespace {
 
@@ -103,6 +105,33 @@ TEST(Report, OnPictures) {
     EXPECT_THAT(page, HasSubstr(name));
   }
 }
+
+TEST(Report, APictureTellsItsNoise) {
+  const TempFolder folder;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  // Luminance 2 in four pixels, variance 0.04 in each: 0.1 of it.
+  WriteExr(folder / "p.exr",
+           {{"image", 2, 2, {"Y"}, {2, 2, 2, 2}, {}},
+            {"samples", 2, 2, {"Y"}, {8, 8, 16, nan}, {}},
+            {"variance", 2, 2, {"Y"}, {0.04F, 0.04F, 0.04F, 0.04F}, {}}});
+  const std::string page = BuildReport(folder / "p.exr");
+  ExpectSelfContained(page);
+  EXPECT_THAT(page, HasSubstr("error 10.0"));
+  EXPECT_THAT(page, HasSubstr("Samples a pixel, up to 16.0"));
+  EXPECT_THAT(page, HasSubstr("samples Y"));
+  EXPECT_EQ(Count(page, "<img"), 3u);
+}
+
+#ifdef NACRE_PRESETS_FOLDER
+TEST(Report, OnAPreset) {
+  const std::string page =
+      BuildReport(std::filesystem::path(NACRE_PRESETS_FOLDER) / "skin");
+  ExpectSelfContained(page);
+  EXPECT_THAT(page, HasSubstr("Whole: every file"));
+  EXPECT_THAT(page, HasSubstr("Factor maps"));
+  EXPECT_THAT(page, HasSubstr("Length d of Burley"));
+}
+#endif
 
 TEST(Report, OnAFolderInTheOrderOfItsStages) {
   const TempFolder folder;

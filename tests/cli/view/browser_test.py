@@ -147,10 +147,15 @@ def see_all(browser, folder):
     with Page(browser, material, "--against", dataset) as page:
         see_slices(page, (14, 12))
         good = float(page.at("residual-G").get_attribute("data-l2"))
+        check("relative L2" in page.text("residual-l2"), "the residual in words")
+        browser.save_screenshot(os.path.join(folder, "material.png"))
+        dot = page.at("curve").find_element(By.TAG_NAME, "circle").get_attribute("cx")
         page.slide("terms", 1)
         page.wait(lambda: float(page.at("residual-G").get_attribute("data-l2")) > 1.5 * good,
                   "one term is worse than four (which miss by %.4f)" % good)
         check("error" in page.text("terms-error"), "and the slider says so")
+        moved = page.at("curve").find_element(By.TAG_NAME, "circle").get_attribute("cx")
+        check(float(moved) < float(dot), "a dot goes along the curve of errors")
         kernels = page.at("kernels").find_elements(By.TAG_NAME, "img")
         page.wait(lambda: all(k.get_property("naturalWidth") == 9 for k in kernels), "kernels")
         check(len(kernels) == 12, "a kernel a term and channel")
@@ -195,7 +200,9 @@ def main():
                    if entry["level"] == "SEVERE"]
             check(not bad, "no errors in the browser's console %s" % bad)
             if "NACRE_SCREENSHOT" in os.environ:
-                os.replace(folder + "/view.png", os.environ["NACRE_SCREENSHOT"])
+                for name in ("view", "material"):
+                    os.replace("%s/%s.png" % (folder, name),
+                               "%s-%s.png" % (os.environ["NACRE_SCREENSHOT"], name))
         finally:
             browser.quit()
 

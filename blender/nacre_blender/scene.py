@@ -75,11 +75,9 @@ class Exporter:
                 log.warn("%s: objects of type %s aren't translated" % (obj.name, obj.type.lower()))
 
     def _integrator(self):
-        unseen = self.soft_lamps or self.scene.render.film_transparent
-        hide = unseen and not self.shining_meshes
-        if unseen and self.shining_meshes:
-            log.warn("lamps with a size and surroundings are seen by the camera, as some mesh "
-                     "shines too")
+        hide = self.scene.render.film_transparent and not self.shining_meshes
+        if self.scene.render.film_transparent and self.shining_meshes:
+            log.warn("surroundings are seen through the transparent film, as some mesh shines too")
         # In a medium, a path's edges are counted by hundreds: it ends by chance alone.
         depth = -1 if self.media else self.scene.nacre.max_depth
         return xml.element("integrator", [

@@ -24,7 +24,8 @@ def _scaled(color, factor):
 def _shining(shape, matrix, radiance, extra=()):
     return xml.element("shape", [
         xml.to_world(matrix), *extra,
-        xml.element("emitter", [xml.rgb("radiance", radiance)], type="area"),
+        xml.element("emitter", [
+            xml.rgb("radiance", radiance), xml.boolean("hidden", True)], type="area"),
     ], type=shape)
 
 
