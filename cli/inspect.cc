@@ -388,6 +388,7 @@ Json Inspect(const std::filesystem::path& path,
       return InspectPly(path);
     case ArtefactKind::kObjMesh:
       return InspectObj(path);
+    case ArtefactKind::kPreset:  // nacre preset show
     case ArtefactKind::kUnknown:
       break;
   }
