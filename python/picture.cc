@@ -115,6 +115,7 @@ void AddImage(py::module_& module) {
 py::tuple Render(const std::filesystem::path& scene_file,
                  const std::map<std::string, std::string>& define,
                  bool lenient,
+                 bool allow_outside,
                  const py::object& progress,
                  int thread_count,
                  std::uint64_t seed,
@@ -125,8 +126,9 @@ py::tuple Render(const std::filesystem::path& scene_file,
   std::vector<std::string> notes;
   LongCall call(progress);
   render::Rendering result = call.Run([&](const ProgressFunction& report) {
-    const render::Scene scene =
-        render::ReadScene(scene_file, {.defines = define, .lenient = lenient});
+    const render::Scene scene = render::ReadScene(
+        scene_file,
+        {.defines = define, .lenient = lenient, .allow_outside = allow_outside});
     notes = scene.notes;
     return render::Render(scene, options, report);
   });
@@ -147,7 +149,9 @@ void AddPictures(py::module_& module) {
   AddImage(module);
   const std::string help =
       "Renders a scene file in Mitsuba's XML; `define` gives values to its $names, "
-      "`lenient` leaves unknown words out with a note.\n\n"
+      "`lenient` leaves unknown words out with a note, `allow_outside` lets it read "
+      "files "
+      "outside its folder.\n\n"
       "Returns the Image and what `nacre render --json` prints, as a dict, with "
       "\"notes\" and \"aovs\" (Images by name). `progress` is called with stage, done "
       "and total; False stops.\n\nOptions:\n" +
@@ -159,6 +163,7 @@ void AddPictures(py::module_& module) {
              py::kw_only(),
              py::arg("define") = std::map<std::string, std::string>{},
              py::arg("lenient") = false,
+             py::arg("allow_outside") = false,
              py::arg("progress") = py::none(),
              py::arg("thread_count") = 0,
              py::arg("seed") = 1);
