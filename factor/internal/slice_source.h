@@ -24,8 +24,8 @@ class SliceSource {
   virtual const reconstruct::RdHeader& header() const = 0;
   /// The block stays valid until the next call.
   virtual SliceBlock Read(std::int64_t first, std::int64_t count) = 0;
-  /// Slices `rows` (ascending) are in `dataset`, one after the other, and needn't be read
-  /// again; null: none are. Both must live until the next call.
+  /// Slices `rows` (ascending) are in `dataset`, one after the other, and needn't be
+  /// read again; null: none are. Both must live until the next call.
   virtual void Know(const std::vector<std::int64_t>* /*rows*/,
                     const reconstruct::RdDataset* /*dataset*/) {}
   /// Whether reading costs next to nothing.
