@@ -1,6 +1,7 @@
 #include "cli/command.h"
 
 #include "cli/command_line.h"
+#include "cli/linked_libraries.h"
 #include "cli/verbs.h"
 #include "core/error.h"
 #include "core/version.h"
@@ -36,7 +37,7 @@ int RunCommand(const std::vector<std::string>& arguments, std::ostream& out) {
   bool version = false;
   bool verbose_version = false;
   app.add_flag(
-      "--version", version, "print the version; with -v those of libraries too");
+      "--version", version, "print the version; with -v all libraries in use too");
   app.add_flag("-v,--verbose", verbose_version);
   app.require_subcommand(0, 1);
 
@@ -55,7 +56,7 @@ int RunCommand(const std::vector<std::string>& arguments, std::ostream& out) {
     return app.exit(e, out, std::cerr) == 0 ? 0 : static_cast<int>(ExitCode::kUsage);
   }
   if (version) {
-    out << "nacre " << Version() << '\n' << (verbose_version ? LibraryVersions() : "");
+    out << "nacre " << Version() << '\n' << (verbose_version ? LinkedLibraries() : "");
     return 0;
   }
   if (!run) {

@@ -117,7 +117,9 @@ std::string ProvenanceOf(const Arguments& arguments) {
                                     {"range", arguments.range},
                                     {"shape", arguments.shape},
                                     {"share", arguments.share},
-                                    {"tile", arguments.tile}}};
+                                    {"tile", arguments.tile},
+                                    {"mix", arguments.mix.filename().string()},
+                                    {"mask", arguments.mask.filename().string()}}};
   for (const std::filesystem::path& input :
        {arguments.file, arguments.mix, arguments.mask}) {
     if (!input.empty()) {

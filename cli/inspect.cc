@@ -2,10 +2,10 @@
 
 #include "cli/artefact.h"
 #include "cli/command_line.h"
+#include "cli/inspect_files.h"
+#include "cli/remake.h"
 #include "core/error.h"
-#include "core/exr.h"
 #include "core/hash.h"
-#include "core/png.h"
 #include "reconstruct/rd_dataset.h"
 #ifdef NACRE_HAS_ACQUIRE
 #include "acquire/session.h"
@@ -16,17 +16,15 @@
 #ifdef NACRE_HAS_FACTOR
 #include "factor/material.h"
 #endif
+#ifdef NACRE_HAS_PRESETS
+#include "cli/preset/preset.h"
+#endif
 #ifdef NACRE_HAS_RIGS
 #include "rigs/phantom.h"
 #endif
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <fstream>
-#include <limits>
 #include <memory>
-#include <sstream>
 
 namespace nacre::cli {
 namespace {
@@ -35,44 +33,6 @@ struct Arguments {
   std::filesystem::path file;
   bool provenance = false;
 };
-
-/// Smallest and largest of the values that are numbers, and how many aren't.
-struct ValueRange {
-  double min = std::numeric_limits<double>::infinity();
-  double max = -std::numeric_limits<double>::infinity();
-  double sum = 0;
-  std::int64_t count = 0;
-  std::int64_t bad_count = 0;
-
-  void Add(double value) {
-    if (!std::isfinite(value)) {
-      ++bad_count;
-      return;
-    }
-    min = std::min(min, value);
-    max = std::max(max, value);
-    sum += value;
-    ++count;
-  }
-  Json ToJson() const {
-    Json json = count > 0 ? Json{{"min", min},
-                                 {"max", max},
-                                 {"mean", sum / static_cast<double>(count)}}
-                          : Json::object();
-    if (bad_count > 0) {
-      json["not_finite"] = bad_count;
-    }
-    return json;
-  }
-};
-
-// Text of a provenance attribute as JSON; what isn't JSON is shown as it is.
-Json ProvenanceOf(const std::string& text) {
-  if (text.empty() || !Json::accept(text)) {
-    return text;
-  }
-  return Json::parse(text);
-}
 
 // What a pass over all slices, which verifies their checksums, finds.
 Json DatasetContents(reconstruct::RdReader& reader, const ProgressFunction& progress) {
@@ -154,44 +114,6 @@ Json InspectMaterial(const std::filesystem::path& path) {
 #endif
 }
 
-Json InspectExr(const std::filesystem::path& path) {
-  Json parts = Json::array();
-  Json provenance;
-  for (const ExrPart& part : ReadExr(path)) {
-    Json channels = Json::array();
-    for (std::size_t c = 0; c < part.channels.size(); ++c) {
-      ValueRange range;
-      for (std::size_t p = 0; p < part.PixelCount(); ++p) {
-        range.Add(static_cast<double>(part.Channel(c)[p]));
-      }
-      Json channel{{"name", part.channels[c]}};
-      channel.update(range.ToJson());
-      channels.push_back(channel);
-    }
-    parts.push_back({{"name", part.name},
-                     {"size", {part.width, part.height}},
-                     {"channels", channels},
-                     {"attributes", part.attributes}});
-    const auto found = part.attributes.find("nacre.provenance");
-    if (found != part.attributes.end()) {
-      provenance = ProvenanceOf(found->second);
-    }
-  }
-  return {{"parts", parts}, {"provenance", provenance}};
-}
-
-Json InspectPng(const std::filesystem::path& path) {
-  const PngImage image = ReadPng(path);
-  ValueRange range;
-  for (const std::uint16_t value : image.values) {
-    range.Add(value);
-  }
-  return {{"size", {image.width, image.height}},
-          {"channels", image.channel_count},
-          {"bits", image.bit_depth},
-          {"values", range.ToJson()}};
-}
-
 Json InspectSession(const std::filesystem::path& path, const Common& common) {
 #ifdef NACRE_HAS_ACQUIRE
   const acquire::SessionReader session(path);
@@ -265,6 +187,31 @@ Json InspectCalibration(const std::filesystem::path& path) {
 #endif
 }
 
+Json InspectPreset(const std::filesystem::path& path) {
+#ifdef NACRE_HAS_PRESETS
+  const preset::Preset p = preset::ReadPreset(path);
+  const std::vector<std::string> problems = preset::CheckPreset(p);
+  if (!problems.empty()) {
+    throw BadData(path.string() + ": " + problems.front());
+  }
+  return {{"name", p.name},
+          {"title", p.title},
+          {"author", p.author},
+          {"licence", p.licence},
+          {"size_mm", {p.width_mm, p.height_mm}},
+          {"method", p.method},
+          {"terms", p.terms},
+          {"eta", p.eta},
+          {"error", p.error},
+          {"bytes", p.Bytes()},
+          {"checksums", "verified"},
+          {"provenance", InspectMaterial(p.File("material")).at("provenance")}};
+#else
+  throw UsageError(path.string() +
+                   ": is a preset, and this build was made without `render`");
+#endif
+}
+
 Json InspectPhantom(const std::filesystem::path& path) {
 #ifdef NACRE_HAS_RIGS
   const rigs::Phantom phantom = rigs::ReadPhantom(path);
@@ -308,62 +255,6 @@ Json InspectRig(const std::filesystem::path& path) {
 #endif
 }
 
-// Counts alone, from the header: a mesh is read by the renderer, not here.
-Json InspectPly(const std::filesystem::path& path) {
-  constexpr std::size_t kHeaderBytes = 1 << 16;
-  std::istringstream header(Head(path, kHeaderBytes));
-  Json json = Json::object();
-  std::string line;
-  while (std::getline(header, line) && !line.starts_with("end_header")) {
-    std::istringstream words(line);
-    std::string word;
-    std::string name;
-    std::string value;
-    words >> word >> name >> value;
-    if (word == "format") {
-      json["format"] = name + " " + value;
-    } else if (word == "element") {
-      json[name] = value;
-    } else if (word == "property") {
-      json["properties"].push_back(line.substr(sizeof("property")));
-    }
-  }
-  if (!header) {
-    throw BadData(path.string() + ": a PLY file whose header doesn't end");
-  }
-  return json;
-}
-
-Json InspectObj(const std::filesystem::path& path) {
-  std::ifstream file(path);
-  std::string line;
-  std::array<std::int64_t, 4> counts{};
-  std::array<ValueRange, 3> box;
-  while (std::getline(file, line)) {
-    std::istringstream words(line);
-    std::string word;
-    words >> word;
-    const std::array<const char*, 4> names = {"v", "vt", "vn", "f"};
-    const auto found = std::find(names.begin(), names.end(), word);
-    if (found == names.end()) {
-      continue;
-    }
-    ++counts[static_cast<std::size_t>(found - names.begin())];
-    for (std::size_t k = 0; word == "v" && k < 3; ++k) {
-      double value = std::numeric_limits<double>::quiet_NaN();
-      words >> value;
-      box[k].Add(value);
-    }
-  }
-  return {{"vertices", counts[0]},
-          {"texture_coordinates", counts[1]},
-          {"normals", counts[2]},
-          {"faces", counts[3]},
-          {"x", box[0].ToJson()},
-          {"y", box[1].ToJson()},
-          {"z", box[2].ToJson()}};
-}
-
 Json Inspect(const std::filesystem::path& path,
              ArtefactKind kind,
              const Common& common) {
@@ -378,6 +269,8 @@ Json Inspect(const std::filesystem::path& path,
       return InspectPng(path);
     case ArtefactKind::kSession:
       return InspectSession(path, common);
+    case ArtefactKind::kPreset:
+      return InspectPreset(path);
     case ArtefactKind::kCalibration:
       return InspectCalibration(path);
     case ArtefactKind::kPhantom:
@@ -388,13 +281,13 @@ Json Inspect(const std::filesystem::path& path,
       return InspectPly(path);
     case ArtefactKind::kObjMesh:
       return InspectObj(path);
-    case ArtefactKind::kPreset:  // nacre preset show
     case ArtefactKind::kUnknown:
       break;
   }
-  throw BadData(path.string() +
-                ": is none of: dataset, material, session, calibration, phantom, rig, "
-                "picture (.exr, .png), mesh (.ply, .obj)");
+  throw BadData(
+      path.string() +
+      ": is none of: dataset, material, preset, session, calibration, phantom, rig, "
+      "picture (.exr, .png), mesh (.ply, .obj)");
 }
 
 // One line a key; lists of objects one line an element.
@@ -418,6 +311,24 @@ std::string ToText(const Json& json) {
   return text;
 }
 
+// For people the commands that remake the file; as JSON all that is recorded too.
+void PrintProvenance(const Json& provenance,
+                     const Arguments& args,
+                     const Common& common) {
+  if (!provenance.is_object()) {
+    throw Error(args.file.string() + ": carries no provenance");
+  }
+  const std::vector<std::string> commands =
+      CommandsThatRemake(provenance, args.file.filename().string());
+  Json json = provenance;
+  json["commands"] = commands;
+  Print(common,
+        json,
+        fmt::format("# by nacre {}\n{}",
+                    provenance.value("version", "of unknown version"),
+                    fmt::join(commands, "\n")));
+}
+
 int Run(const Arguments& args, const Common& common) {
   const ArtefactKind kind = DetectKind(args.file);
   Json json{{"file", args.file.string()}, {"kind", Name(kind)}};
@@ -427,8 +338,7 @@ int Run(const Arguments& args, const Common& common) {
   }
   json.update(Inspect(args.file, kind, common));
   if (args.provenance) {
-    const Json provenance = json.value("provenance", Json());
-    Print(common, provenance, provenance.dump(2));
+    PrintProvenance(json.value("provenance", Json()), args, common);
     return 0;
   }
   Print(common, json, ToText(json));
@@ -440,9 +350,11 @@ int Run(const Arguments& args, const Common& common) {
 std::function<int()> MakeInspectVerb(CLI::App& app, const Common& common) {
   const auto args = std::make_shared<Arguments>();
   app.add_option("file", args->file, "anything nacre reads or writes")->required();
-  app.add_flag("--provenance",
-               args->provenance,
-               "only where it came from: software, options and hashes of the inputs");
+  app.add_flag(
+      "--provenance",
+      args->provenance,
+      "the commands that remake it and the hashes of what they need; with --json all "
+      "that is recorded");
   app.footer(
       "Reads all of the file and verifies its checksums: exit code 3 if it isn't "
       "whole.");

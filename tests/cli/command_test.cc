@@ -40,6 +40,15 @@ TEST(Command, PrintsItsVersion) {
   EXPECT_EQ(out.str(), "nacre " + Version() + "\n");
 }
 
+TEST(Command, ListsWhatItIsMadeOf) {
+  std::ostringstream out;
+  EXPECT_EQ(RunCommand({"--version", "--verbose"}, out), 0);
+  EXPECT_THAT(out.str(), HasSubstr("OpenEXR "));
+  EXPECT_THAT(out.str(), HasSubstr("Eigen 3"));
+  EXPECT_THAT(out.str(), ::testing::ContainsRegex("\n/[^\n]*libOpenEXR[^\n]*\\.so"))
+      << "the file itself, as it was loaded";
+}
+
 TEST(Command, BadDataSaysSo) {
   const testing::TempFolder folder;
   WriteFile(folder / "bad.rd.exr", "not an OpenEXR file");
