@@ -10,7 +10,12 @@ target_compile_options(nacre_flags INTERFACE
   $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wuseless-cast>
   $<$<BOOL:${NACRE_WERROR}>:-Werror>
   -fno-math-errno -ffp-contract=off)
-if(NACRE_SANITIZE)
+if(NOT NACRE_SANITIZE)
+  target_compile_options(nacre_flags INTERFACE
+    -fstack-protector-strong -fstack-clash-protection
+    $<$<NOT:$<CONFIG:Debug>>:-D_FORTIFY_SOURCE=2>)
+  target_link_options(nacre_flags INTERFACE -Wl,-z,relro,-z,now)
+else()
   target_compile_options(nacre_flags INTERFACE -fsanitize=${NACRE_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(nacre_flags INTERFACE -fsanitize=${NACRE_SANITIZE})
 endif()
