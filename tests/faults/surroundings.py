@@ -1,6 +1,6 @@
 """Too little memory, a clock that jumps, two processes at one session, a moved session."""
 
-import os
+import fcntl
 import resource
 import shutil
 import signal
@@ -100,39 +100,39 @@ def kills(line, folder, most, report, only):
             report.add(verb, f"{signal.Signals(number).name} at a random instant", wrong, " ".join(arguments))
 
 
+def half_a_session(line, folder, arguments):
+    """A capture that was killed with its journal begun."""
+    line.copy(folder)
+    process = subprocess.Popen(
+        [line.nacre, *arguments, "--threads", "1"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    while not (folder / "o" / "journal").exists() and process.poll() is None:
+        time.sleep(0.002)
+    process.kill()
+    process.wait()
+
+
 def sessions(line, folder, report):
     """One session for two, and one that is carried elsewhere half done."""
     arguments = ["capture", "rig.toml", "--out", "o"]
     truth = truth_of(line, folder, arguments, ["o"])
 
-    def start(extra):
-        return subprocess.Popen(
-            [line.nacre, *arguments, *extra, "--threads", "1"],
-            cwd=folder,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-
-    line.copy(folder)
-    first = start([])
-    while not (folder / "o" / "journal").exists() and first.poll() is None:
-        time.sleep(0.01)
-    second = line.run([*arguments, "--resume"], folder)
-    first.communicate()
-    wrong = None
-    if first.returncode != 0 or without_lock(content(folder, ["o"])) != truth:
-        wrong = "the first is harmed"
-    elif second.returncode == 0 or "nacre: " not in second.stderr:
-        wrong = "the second isn't refused"
+    half_a_session(line, folder, arguments)
+    with open(folder / "o" / "lock", "r+", encoding="ascii") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)  # as the process that captures holds it
+        before = content(folder, ["o"])
+        second = line.run([*arguments, "--resume"], folder)
+        wrong = None
+        if second.returncode != 1 or "is capturing into this session" not in second.stderr:
+            wrong = f"the second isn't refused: {second.stderr.strip()[-200:]}"
+        elif content(folder, ["o"]) != before:
+            wrong = "the second changed the session"
     report.add("capture", "two processes, one session", wrong, " ".join(arguments))
 
-    line.copy(folder)
-    first = start([])
-    while not (folder / "o" / "journal").exists() and first.poll() is None:
-        time.sleep(0.01)
-    os.kill(first.pid, signal.SIGKILL)
-    first.communicate()
+    half_a_session(line, folder, arguments)
     shutil.move(folder / "o", folder / "elsewhere")
     result = line.run(["capture", "rig.toml", "--out", "elsewhere", "--resume"], folder)
     moved = {
