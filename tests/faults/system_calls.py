@@ -111,10 +111,12 @@ class Trial:
 
 
 def spread(first, last, most):
-    """At most so many of the numbers from first to last, with both."""
+    """At most so many of the numbers from first to last, with both; of one the last."""
     count = last - first + 1
     if count <= most:
         return list(range(first, last + 1))
+    if most == 1:
+        return [last]
     return sorted({first + round(k * (count - 1) / (most - 1)) for k in range(most)})
 
 
