@@ -28,6 +28,19 @@ using internal::SliceSource;
 // its fourth power, or all pairs of points.
 std::int64_t WorkingBytes(const reconstruct::RdHeader& header,
                           const FactorOptions& options) {
+  if (options.method == "bilinear" &&
+      internal::PairBytes(header) > 1e6 * options.memory_mb) {
+    throw UsageError(fmt::format(
+        "the bilinear model holds all pairs of points: {:.0f} MB for {} x {} points "
+        "with windows of {} and {} channels, where option memory_mb allows {:.0f}; "
+        "allow as much, or take --method reciprocal, which does with less",
+        std::ceil(internal::PairBytes(header) / 1e6),
+        header.points_x,
+        header.points_y,
+        header.core,
+        header.channels.size(),
+        options.memory_mb));
+  }
   const auto channels = static_cast<double>(header.channels.size());
   const auto window = static_cast<double>(header.WindowSize());
   const double method_bytes =
@@ -143,9 +156,12 @@ Factorization FactorSource(SliceSource& source,
                            const ProgressFunction& progress) {
   nacre::Validate(asked);
   if (asked.method == internal::kAutoMethod) {
-    return internal::FactorByBest(asked, [&](const FactorOptions& candidate) {
-      return FactorSource(source, clusterer, candidate, progress);
-    });
+    const bool bilinear_fits =
+        internal::PairBytes(source.header()) <= 1e6 * asked.memory_mb;
+    return internal::FactorByBest(
+        asked, bilinear_fits, [&](const FactorOptions& candidate) {
+          return FactorSource(source, clusterer, candidate, progress);
+        });
   }
   const MakeMethod make = FindMethod(asked.method);
   FactorOptions options = asked;

@@ -49,12 +49,19 @@ int OwnTerms(const std::string& method) {
 
 Factorization FactorByBest(
     const FactorOptions& options,
+    bool bilinear_fits,
     const std::function<Factorization(const FactorOptions&)>& factor) {
   std::optional<Factorization> best;
   std::string tried;
   for (const Candidate& candidate : Candidates()) {
     if (options.clusters > 1 && candidate.method != std::string("log-svd")) {
       continue;  // models with shared maps have no clusters
+    }
+    if (candidate.method == std::string("bilinear") && !bilinear_fits) {
+      tried += fmt::format("{}bilinear doesn't fit into {:.0f} MB",
+                           tried.empty() ? "" : "; ",
+                           options.memory_mb);
+      continue;
     }
     FactorOptions its = options;
     its.method = candidate.method;

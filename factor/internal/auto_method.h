@@ -18,9 +18,10 @@ int OwnTerms(const std::string& method);
 ///   with `error`, takes the fewest bytes of those that keep it, else has the least
 ///   error; with `bytes` or neither, has the least product of relative L2 and log error
 ///   of those that fit the bytes, else takes the fewest.
-/// Notes tell what each of them came to.
+/// Notes tell what each of them came to. Bilinear is left out if its pairs don't fit.
 Factorization FactorByBest(
     const FactorOptions& options,
+    bool bilinear_fits,
     const std::function<Factorization(const FactorOptions&)>& factor);
 
 }  // namespace nacre::factor::internal

@@ -208,5 +208,18 @@ TEST(Bilinear, HasNoClusters) {
   }
 }
 
+TEST(Bilinear, SaysHowMuchMemoryItNeeds) {
+  const RdDataset dataset = MakeChessboard({.points_x = 24, .points_y = 24});
+  const FactorOptions options{.method = "bilinear", .terms = 1, .memory_mb = 1};
+  try {
+    Factor(dataset, options);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kUsage);
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("memory_mb allows 1;"));
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("reciprocal"));
+  }
+}
+
 }  // namespace
 }  // namespace nacre::factor

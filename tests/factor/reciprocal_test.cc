@@ -244,6 +244,51 @@ TEST(Reciprocal, LittleMemoryTakesFewerPairs) {
   const auto some = Factor(dataset, options).summary;
   EXPECT_THAT(some.notes, ::testing::Contains(HasSubstr("as memory allows")));
   EXPECT_LT(some.relative_l2, 1.3 * all.relative_l2);
+  EXPECT_LT(some.log_rms, 2 * all.log_rms);
+}
+
+// Large data: chosen by a sample and read once, or by all slices.
+TEST(Reciprocal, OneReadingIsAsGoodAsMany) {
+  const RdDataset dataset =
+      MakeChessboard({.points_x = 92, .points_y = 90, .core = 7, .channels = 1});
+  FactorOptions options = Reciprocal(2);
+  const auto once = Factor(dataset, options);
+  options.check_slices = 0;
+  const auto many = Factor(dataset, options);
+  EXPECT_LT(once.summary.passes, many.summary.passes);
+  EXPECT_EQ(once.summary.measured_slices, 4096);
+  EXPECT_EQ(many.summary.measured_slices, 92 * 90);
+  // What is said of some slices is so of all.
+  const double error = ErrorAgainst(dataset, once.material);
+  EXPECT_NEAR(once.summary.relative_l2 / error, 1, 0.05);
+  EXPECT_NEAR(many.summary.relative_l2 / ErrorAgainst(dataset, many.material), 1, 1e-3);
+  // They begin with other maps, and so needn't end at the same.
+  EXPECT_LT(error, 1.1 * many.summary.relative_l2);
+  EXPECT_LT(once.summary.log_rms, 1.1 * many.summary.log_rms);
+}
+
+// The terms of the model are searched, what is left goes to the rest.
+TEST(Reciprocal, BytesAndErrorAreKeptWithARest) {
+  const RdDataset dataset =
+      MakeChessboard({.points_x = 16, .points_y = 16, .core = 7, .channels = 1});
+  FactorOptions options = Reciprocal(3);
+  options.rest = 4;
+  const auto full = Factor(dataset, options).summary;
+  EXPECT_EQ(full.terms, 3);
+  options.bytes = 0.85 * static_cast<double>(full.bytes);
+  const auto small = Factor(dataset, options);
+  EXPECT_LE(static_cast<double>(small.summary.bytes), options.bytes);
+  EXPECT_LT(small.summary.terms, 3);
+  EXPECT_EQ(FileBytes(small.material), small.summary.bytes);
+  options.bytes = 0;
+  options.error = 1.001 * small.summary.relative_l2;
+  const auto good = Factor(dataset, options).summary;
+  EXPECT_LE(good.relative_l2, options.error);
+  EXPECT_LE(good.terms, 3);
+  options.error = 1e-7;
+  const auto never = Factor(dataset, options).summary;
+  EXPECT_THAT(never.notes, ::testing::Contains(HasSubstr("is not reached")));
+  EXPECT_EQ(never.terms, full.terms);
 }
 
 TEST(Reciprocal, ThreadCountDoesNotChangeABit) {
