@@ -21,7 +21,7 @@ struct PathTracer::State {
   // How the ray was chosen, for what it may find at its end.
   bool count_emission = true;
   bool from_camera = false;  ///< and nothing met so far
-  bool delta = true;  ///< nothing else could have found it
+  bool delta = true;         ///< nothing else could have found it
   // Since the last surface that shows light of photons: whether the path left it by a
   // lobe that they are shown by, and has met one that carries them.
   bool from_shown = false;
