@@ -19,6 +19,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <new>
 
 namespace nacre {
 namespace {
@@ -149,6 +150,38 @@ class MemoryStream : public Imf::OStream {
   std::string bytes_;
 };
 
+class MemoryReader : public Imf::IStream {
+ public:
+  explicit MemoryReader(const std::string& bytes)
+      : Imf::IStream("memory"), bytes_(bytes) {}
+  bool read(char to[], int n) override {
+    const auto count = static_cast<std::size_t>(n);
+    if (position_ + count > bytes_.size()) {
+      throw BadData("ends too early");
+    }
+    std::copy_n(bytes_.data() + position_, count, to);
+    position_ += count;
+    return position_ < bytes_.size();
+  }
+  std::uint64_t tellg() override { return position_; }
+  void seekg(std::uint64_t position) override { position_ = position; }
+
+ private:
+  const std::string& bytes_;
+  std::size_t position_ = 0;
+};
+
+// OpenEXR leaves out what it couldn't pack for want of memory, and says nothing.
+void RequireWhole(const std::string& bytes) {
+  MemoryReader stream(bytes);
+  Imf::MultiPartInputFile file(stream, 0, /*reconstructChunkOffsetTable=*/false);
+  for (int part = 0; part < file.parts(); ++part) {
+    if (!file.partComplete(part)) {
+      throw std::bad_alloc();
+    }
+  }
+}
+
 std::string Encode(const std::vector<ExrPart>& parts) {
   const std::vector<Imf::Header> headers = HeadersOf(parts);
   MemoryStream stream;
@@ -157,7 +190,9 @@ std::string Encode(const std::vector<ExrPart>& parts) {
         stream, headers.data(), static_cast<int>(headers.size()));
     WriteParts(output, parts);
   }
-  return std::move(stream).Take();
+  std::string bytes = std::move(stream).Take();
+  RequireWhole(bytes);
+  return bytes;
 }
 
 // Alphabetical, but R, G, B (and X, Y, Z as they are) in the order people think of

@@ -109,7 +109,8 @@ def half_a_session(line, folder, arguments):
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    while not (folder / "o" / "journal").exists() and process.poll() is None:
+    begun = (folder / "o" / "session.json", folder / "o" / "journal")
+    while not all(file.exists() for file in begun) and process.poll() is None:
         time.sleep(0.002)
     process.kill()
     process.wait()
