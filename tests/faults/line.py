@@ -172,6 +172,8 @@ class Line:
     def run(self, arguments, folder, environment=None, preexec=None, timeout=120):
         variables = dict(os.environ)
         variables.pop("NACRE_FAULT", None)
+        # With more it doesn't load in little memory, and sums in another order.
+        variables["OPENBLAS_NUM_THREADS"] = "1"
         variables.update(environment or {})
         return subprocess.run(
             [self.nacre, *arguments] + ([] if arguments == ["--version"] else ["--threads", "1"]),

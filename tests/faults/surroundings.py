@@ -1,6 +1,7 @@
 """Too little memory, a clock that jumps, two processes at one session, a moved session."""
 
 import fcntl
+import os
 import resource
 import shutil
 import signal
@@ -41,8 +42,7 @@ def memory(line, folder, most, report, only):
         for k in range(most):
             limit = int(450e6 + 2e9 * k / most)  # in less, libraries don't load
             line.copy(folder)
-            few = {"OPENBLAS_NUM_THREADS": "1"}  # or it doesn't load where cores are many
-            result = line.run(arguments, folder, few, preexec=limited(limit))
+            result = line.run(arguments, folder, preexec=limited(limit))
             wrong = None
             if result.returncode not in (0, 1):
                 wrong = f"exit code {result.returncode}: {result.stderr.strip()[-200:]}"
@@ -83,6 +83,7 @@ def kills(line, folder, most, report, only):
             process = subprocess.Popen(
                 [line.nacre, *arguments, "--threads", "2"],
                 cwd=folder,
+                env=dict(os.environ, OPENBLAS_NUM_THREADS="1"),
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
@@ -107,6 +108,7 @@ def half_a_session(line, folder, arguments):
     process = subprocess.Popen(
         [line.nacre, *arguments, "--threads", "1"],
         cwd=folder,
+        env=dict(os.environ, OPENBLAS_NUM_THREADS="1"),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
