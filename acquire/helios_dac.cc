@@ -23,7 +23,7 @@ constexpr std::uint8_t kPlayOnce = 2;  // never left out: a frame without it loo
 constexpr std::chrono::milliseconds kDeafAfterStop{100};
 // Of a program that has just died: it has the DAC for a moment.
 constexpr std::chrono::milliseconds kWaitForWatchdog{1500};
-constexpr std::chrono::milliseconds kPause{20};
+constexpr std::chrono::milliseconds kRetryPause{20};
 
 std::vector<std::uint8_t> Encode(const LaserFrame& frame) {
   std::vector<std::uint8_t> bytes;
@@ -96,7 +96,7 @@ std::unique_ptr<HeliosUsb> Open(const std::string& name) {
       return found;
     }
     if (any_busy && Clock::now() < give_up) {
-      std::this_thread::sleep_for(kPause);
+      std::this_thread::sleep_for(kRetryPause);
       continue;
     }
     if (!others.empty()) {

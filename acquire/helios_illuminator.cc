@@ -15,7 +15,7 @@ namespace nacre::acquire {
 namespace {
 
 // Between two looks at the DAC: a fraction of a frame.
-constexpr std::chrono::microseconds kPause{1000};
+constexpr std::chrono::microseconds kBusyPause{1000};
 constexpr std::chrono::milliseconds kIdlePause{20};
 
 double NowS() {
@@ -79,7 +79,8 @@ struct HeliosIlluminator::Parts {
       ++steps;
       changed.notify_all();
       const bool busy = feeder.HasDac() && !(IsDark() && feeder.IsSteady());
-      woken.wait_for(lock, stop, busy ? kPause : kIdlePause, [this] { return asked; });
+      woken.wait_for(
+          lock, stop, busy ? kBusyPause : kIdlePause, [this] { return asked; });
       asked = false;
     }
   }
@@ -120,7 +121,7 @@ struct HeliosIlluminator::Parts {
   void AwaitDark() noexcept {
     std::unique_lock lock(mutex);
     while (!feeder.IsSteady() && NowS() < feeder.dark_by_s()) {
-      changed.wait_for(lock, kPause);
+      changed.wait_for(lock, kBusyPause);
     }
   }
 

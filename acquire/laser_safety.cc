@@ -12,7 +12,6 @@ namespace {
 
 // Places closer than this are one, so that no jitter by a step passes for a pause.
 constexpr int kPlaceSteps = 16;
-constexpr std::size_t kMostPoints = 4095;  // that a Helios takes
 
 double LongestStretchUs(const LaserFrame& frame) {
   std::size_t longest = 0;
@@ -159,7 +158,7 @@ std::optional<std::string> LaserSafety::Refusal(const LaserFrame& frame,
 }
 
 std::optional<std::string> LaserSafety::ShapeRefusal(const LaserFrame& frame) const {
-  if (frame.points.empty() || frame.points.size() > kMostPoints ||
+  if (frame.points.empty() || frame.points.size() > std::size_t{kMostPoints} ||
       frame.points_per_s < 7 || frame.points_per_s > 65535) {
     return fmt::format(
         "{} points at {} points/s; a frame has 1 to {} at 7 to 65535 points/s",

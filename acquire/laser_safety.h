@@ -73,6 +73,9 @@ class LaserSafety {
   /// within 50 ms, should the host die.
   static constexpr double kLongestFrameS = 0.025;
 
+  /// A frame has at most so many points: what a Helios takes.
+  static constexpr int kMostPoints = 4095;
+
   explicit LaserSafety(const LaserLimits& limits);
 
   LaserState state() const { return state_; }

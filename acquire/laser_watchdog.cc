@@ -29,7 +29,7 @@ constexpr char kRelease = 'q';
 constexpr std::chrono::seconds kStartTimeout{10};
 // After its parent's death: the system closes what that had open within milliseconds.
 constexpr std::chrono::seconds kGiveUp{2};
-constexpr std::chrono::microseconds kPause{500};
+constexpr std::chrono::microseconds kWatchPause{500};
 
 class SpawnSettings {
  public:
@@ -196,7 +196,7 @@ int RunLaserWatchdog(int usb_bus, int usb_address, pid_t parent) {
       }
       last = e.what();
     }
-    std::this_thread::sleep_for(kPause);
+    std::this_thread::sleep_for(kWatchPause);
   }
   throw DeviceError(last);
 }

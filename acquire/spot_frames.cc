@@ -12,7 +12,6 @@
 namespace nacre::acquire {
 namespace {
 
-constexpr int kMostPoints = 4095;
 // Room for a frame to be late before the one that waits has ended, and short enough for
 // two of them to end within 50 ms.
 constexpr double kLongestCycleS = 0.020;
@@ -37,7 +36,7 @@ std::int64_t CommonPoints(std::span<const double> exposures_us, int points_per_s
 
 // How many cycles make a frame of a good length; none if that can't be.
 std::optional<int> CyclesPerFrame(int cycle_points, int points_per_s) {
-  for (int cycles = 1; cycles * cycle_points <= kMostPoints; ++cycles) {
+  for (int cycles = 1; cycles * cycle_points <= LaserSafety::kMostPoints; ++cycles) {
     const double seconds =
         static_cast<double>(cycles * cycle_points) / static_cast<double>(points_per_s);
     if (seconds > LaserSafety::kLongestFrameS) {

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <limits>
-#include <memory>
 
 namespace nacre::reconstruct {
 namespace {
@@ -157,11 +156,6 @@ Json Number(double value) {
 }
 
 }  // namespace
-
-SliceSource DatasetSource(const std::filesystem::path& path) {
-  const auto reader = std::make_shared<RdReader>(path);
-  return {reader->header(), [reader](int i, int j) { return reader->ReadSlice(i, j); }};
-}
 
 ErrorFigures CompareSlices(const SliceSource& a,
                            const SliceSource& b,

@@ -2,23 +2,12 @@
 
 #include "core/json_fwd.h"
 #include "core/progress.h"
-#include "reconstruct/rd_dataset.h"
+#include "reconstruct/slice_source.h"
 
 #include <cstdint>
-#include <functional>
 #include <string>
 
 namespace nacre::reconstruct {
-
-/// Where slices come from: a dataset, a material, memory. `slice` is called in the
-/// order of the file, rows from the top.
-struct SliceSource {
-  RdHeader header;
-  std::function<RdSlice(int i, int j)> slice;
-};
-
-/// Reads on demand; owns the reader.
-SliceSource DatasetSource(const std::filesystem::path& path);
 
 /// How far a test `b` is from a reference `a`. Sums run over the values that are valid
 /// in both; all channels count alike.

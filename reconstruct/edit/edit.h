@@ -1,19 +1,12 @@
 #pragma once
 
 #include "core/progress.h"
-#include "reconstruct/rd_dataset.h"
+#include "reconstruct/slice_source.h"
 
 #include <filesystem>
-#include <functional>
 #include <vector>
 
 namespace nacre::reconstruct {
-
-/// Slices of a sample, from wherever they come.
-struct SliceSource {
-  RdHeader header;
-  std::function<RdSlice(int i, int j)> slice;
-};
 
 /// What an edit does, as in SubEdit [Song et al. 2009]: R_d(x_i, x_o) is taken as what
 /// both ends agree on, so that each point has a profile of its own that may be changed.

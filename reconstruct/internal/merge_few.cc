@@ -8,8 +8,8 @@ namespace nacre::reconstruct::internal {
 namespace {
 
 // Pixels whose counts are made floats at a time: 2 kB an exposure.
-constexpr std::size_t kBlock = 512;
-using Block = std::array<float, kBlock>;
+constexpr std::size_t kFewBlock = 512;
+using FewBlock = std::array<float, kFewBlock>;
 
 struct Result {
   float* rate;
@@ -22,7 +22,7 @@ struct Result {
 // weights, which are brought to one denominator.
 template <std::size_t kCount>
 [[gnu::always_inline]] inline void MergeOf(const Bracket* brackets,
-                                           const Block* counts,
+                                           const FewBlock* counts,
                                            Noise noise,
                                            std::size_t pixels,
                                            Result result) {
@@ -81,7 +81,7 @@ template <std::size_t kCount>
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeOne(
     const Bracket* brackets,
-    const Block* counts,
+    const FewBlock* counts,
     Noise noise,
     std::size_t pixels,
     Result result) {
@@ -90,7 +90,7 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeOne(
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeTwo(
     const Bracket* brackets,
-    const Block* counts,
+    const FewBlock* counts,
     Noise noise,
     std::size_t pixels,
     Result result) {
@@ -99,7 +99,7 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeTwo(
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeThree(
     const Bracket* brackets,
-    const Block* counts,
+    const FewBlock* counts,
     Noise noise,
     std::size_t pixels,
     Result result) {
@@ -108,7 +108,7 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeThree(
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MergeFour(
     const Bracket* brackets,
-    const Block* counts,
+    const FewBlock* counts,
     Noise noise,
     std::size_t pixels,
     Result result) {
@@ -139,9 +139,9 @@ void MergeFew(std::span<const Bracket> brackets, Noise noise, RateFrame& merged)
   Expect(!brackets.empty() && brackets.size() <= kFewExposures, "a few exposures");
   constexpr std::array kMerge = {MergeOne, MergeTwo, MergeThree, MergeFour};
   const std::size_t pixels = merged.rate.size();
-  std::array<Block, kFewExposures> counts;
-  for (std::size_t begin = 0; begin < pixels; begin += kBlock) {
-    const std::size_t count = std::min(kBlock, pixels - begin);
+  std::array<FewBlock, kFewExposures> counts;
+  for (std::size_t begin = 0; begin < pixels; begin += kFewBlock) {
+    const std::size_t count = std::min(kFewBlock, pixels - begin);
     for (std::size_t b = 0; b < brackets.size(); ++b) {
       ToFloats(brackets[b].counts + begin, count, counts[b].data());
     }

@@ -7,19 +7,19 @@ namespace nacre::reconstruct::internal {
 namespace {
 
 // Pixels are taken in blocks that stay in the cache through all steps.
-constexpr std::size_t kBlock = 1024;
-using Block = std::array<float, kBlock>;
+constexpr std::size_t kManyBlock = 1024;
+using ManyBlock = std::array<float, kManyBlock>;
 
 // Sums over the exposures that a pixel can use, shortest first; the first unusable one
 // ends it. Then sums over the same, weighted.
 struct Sums {
-  Block signal;
-  Block variance;
-  Block used;  ///< number of exposures
-  Block exposure_us;
-  Block pooled_rate;
-  Block weighted_rate;
-  Block weight;
+  ManyBlock signal;
+  ManyBlock variance;
+  ManyBlock used;  ///< number of exposures
+  ManyBlock exposure_us;
+  ManyBlock pooled_rate;
+  ManyBlock weighted_rate;
+  ManyBlock weight;
 };
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void AddBracket(
@@ -72,12 +72,12 @@ void MergeBlock(std::span<const Bracket> brackets,
                 std::size_t count,
                 RateFrame& merged) {
   Sums sums;  // 28 kB, of which only what is in use is set to 0
-  for (Block* block : {&sums.signal,
-                       &sums.variance,
-                       &sums.used,
-                       &sums.exposure_us,
-                       &sums.weighted_rate,
-                       &sums.weight}) {
+  for (ManyBlock* block : {&sums.signal,
+                           &sums.variance,
+                           &sums.used,
+                           &sums.exposure_us,
+                           &sums.weighted_rate,
+                           &sums.weight}) {
     std::fill_n(block->begin(), count, 0.0F);
   }
   const auto add = [&](auto&& add_one) {
@@ -107,8 +107,8 @@ void MergeBlock(std::span<const Bracket> brackets,
 void MergeMany(std::span<const Bracket> brackets, Noise noise, RateFrame& merged) {
   const std::size_t pixels = merged.rate.size();
   merged.saturated_count = 0;
-  for (std::size_t begin = 0; begin < pixels; begin += kBlock) {
-    MergeBlock(brackets, noise, begin, std::min(kBlock, pixels - begin), merged);
+  for (std::size_t begin = 0; begin < pixels; begin += kManyBlock) {
+    MergeBlock(brackets, noise, begin, std::min(kManyBlock, pixels - begin), merged);
   }
 }
 
