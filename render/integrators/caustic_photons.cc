@@ -8,7 +8,7 @@
 namespace nacre::render {
 namespace {
 
-constexpr std::int64_t kBlock = 4096;
+constexpr std::int64_t kPhotonBlock = 4096;
 
 // Before what light bends through glass is forgotten.
 constexpr int kMostBounces = 64;
@@ -58,12 +58,12 @@ PhotonMap CausticPhotons::Map(std::int64_t index,
   if (!targets_.empty() && world_.light_count() > 0) {
     const std::uint64_t own =
         MixSeed(MixSeed(seed, 0xCA57), static_cast<std::uint64_t>(index));
-    const std::int64_t blocks = (settings_.count + kBlock - 1) / kBlock;
+    const std::int64_t blocks = (settings_.count + kPhotonBlock - 1) / kPhotonBlock;
     std::vector<std::vector<Photon>> found(static_cast<std::size_t>(blocks));
     ParallelFor(blocks, thread_count, [&](std::int64_t block) {
       const std::int64_t end =
-          std::min<std::int64_t>(settings_.count, (block + 1) * kBlock);
-      for (std::int64_t n = block * kBlock; n < end; ++n) {
+          std::min<std::int64_t>(settings_.count, (block + 1) * kPhotonBlock);
+      for (std::int64_t n = block * kPhotonBlock; n < end; ++n) {
         Trace(own, n, found[static_cast<std::size_t>(block)]);
       }
     });
