@@ -1,5 +1,7 @@
 #include "cli/command_line.h"
 
+#include "core/ranks.h"
+
 #include <chrono>
 #include <csignal>
 #include <cstdio>
@@ -89,6 +91,10 @@ class Console {
 };
 
 }  // namespace
+
+bool Common::IsRoot() const {
+  return ranks == nullptr || ranks->IsRoot();
+}
 
 void Say(const Common& common, const std::string& line) {
   if (common.verbosity > 0) {

@@ -12,6 +12,10 @@
 #include <iosfwd>
 #include <string>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::cli {
 
 /// Options that every verb takes.
@@ -22,6 +26,10 @@ struct Common {
   std::uint64_t seed = 1;
   std::ostream* out =
       nullptr;  ///< where results go: stdout, or the verb that called this one
+  const Ranks* ranks = nullptr;  ///< that share this run; null: this process alone
+
+  /// The one process that writes files: all do if each is alone.
+  bool IsRoot() const;
 };
 
 /// A verb: adds its options to its subcommand and returns what to run once the command

@@ -2,9 +2,13 @@
 
 #include "cli/command.h"
 #include "core/error.h"
+#include "core/ranks.h"
 
+#include <chrono>
+#include <cstdio>
 #include <fmt/format.h>
 #include <iostream>
+#include <memory>
 #include <new>
 #include <sys/resource.h>
 #include <thread>
@@ -27,22 +31,51 @@ void RequireAddressSpace() {
   }
 }
 
+// Where everybody would say the same, the root says it: standard output and talk of the
+// other ranks go nowhere.
+void Silence() {
+  std::cout.rdbuf(nullptr);
+  std::cerr.rdbuf(nullptr);
+}
+
+// One rank's failure is that of all: its message, then the end of every process. What
+// several find out at a time is left to the root to say.
+int Fail(const Ranks* ranks, const std::string& message, ExitCode code) {
+  const auto exit_code = static_cast<int>(code);
+  if (ranks == nullptr || ranks->size() == 1) {
+    std::cerr << "nacre: " << message << '\n';
+    return exit_code;
+  }
+  if (!ranks->IsRoot()) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  }
+  const std::string line = fmt::format("nacre: rank {}: {}\n", ranks->rank(), message);
+  std::fputs(line.c_str(), stderr);
+  ranks->Abort(exit_code);
+  return exit_code;
+}
+
 int RunAndReport(int argc, char** argv) {
+  std::unique_ptr<Ranks> ranks;
   try {
     RequireAddressSpace();
-    return RunCommand({argv + 1, argv + argc}, std::cout);
+    ranks = JoinRanks();
+    if (!ranks->IsRoot()) {
+      Silence();
+    }
+    return RunCommand({argv + 1, argv + argc}, std::cout, ranks.get());
   } catch (const Error& e) {
-    std::cerr << "nacre: " << e.what() << '\n';
-    return static_cast<int>(e.code());
+    return Fail(ranks.get(), e.what(), e.code());
   } catch (const LogicError& e) {
-    std::cerr << "nacre: this is a bug in nacre: " << e.what() << '\n';
-    return static_cast<int>(ExitCode::kBug);
+    return Fail(ranks.get(),
+                fmt::format("this is a bug in nacre: {}", e.what()),
+                ExitCode::kBug);
   } catch (const std::bad_alloc&) {
-    std::cerr << "nacre: out of memory; see whether the verb has a --memory option\n";
-    return static_cast<int>(ExitCode::kFailed);
+    return Fail(ranks.get(),
+                "out of memory; see whether the verb has a --memory option",
+                ExitCode::kFailed);
   } catch (const std::exception& e) {
-    std::cerr << "nacre: " << e.what() << '\n';
-    return static_cast<int>(ExitCode::kFailed);
+    return Fail(ranks.get(), e.what(), ExitCode::kFailed);
   }
 }
 
