@@ -15,7 +15,7 @@ double InternalFresnelMoment(double eta, int power) {
   // square root, which μ = critical + (1 − critical) s⁴ smooths.
   const double critical = std::sqrt(1 - 1 / (eta * eta));
   double moment = std::pow(critical, power + 1) / (power + 1);
-  const internal::GaussRule rule = internal::GaussLegendre(96);
+  const rigs::internal::GaussRule rule = rigs::internal::GaussLegendre(96);
   const double span = 1 - critical;
   for (std::size_t k = 0; k < rule.node.size(); ++k) {
     const double s = 0.5 * (1 + rule.node[k]);

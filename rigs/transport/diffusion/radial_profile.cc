@@ -68,7 +68,7 @@ double RadialProfile::CellMean(double x_mm, double y_mm, double width_mm) const 
   const double nearest = std::max(std::abs(x_mm), std::abs(y_mm));
   if (nearest < 1e-9 * width_mm) {
     // Eight triangles, in polar coordinates; r = v³ R calms the singularity.
-    const internal::GaussRule rule = internal::GaussLegendre(24);
+    const rigs::internal::GaussRule rule = rigs::internal::GaussLegendre(24);
     double sum = 0;
     for (std::size_t a = 0; a < rule.node.size(); ++a) {
       const double angle = std::numbers::pi / 8 * (1 + rule.node[a]);
@@ -83,7 +83,7 @@ double RadialProfile::CellMean(double x_mm, double y_mm, double width_mm) const 
     return 8 * sum / (width_mm * width_mm);
   }
   const int order = nearest < 2.5 * width_mm ? 16 : 5;
-  const internal::GaussRule rule = internal::GaussLegendre(order);
+  const rigs::internal::GaussRule rule = rigs::internal::GaussLegendre(order);
   double sum = 0;
   for (std::size_t b = 0; b < rule.node.size(); ++b) {
     for (std::size_t a = 0; a < rule.node.size(); ++a) {
