@@ -2,6 +2,7 @@
 
 #include "acquire/mosaic.h"
 #include "calibrate/filter_estimate.h"
+#include "calibrate/internal/one_thread_algebra.h"
 #include "calibrate/internal/pictures.h"
 #include "calibrate/mosaic.h"
 #include "core/error.h"
@@ -218,6 +219,7 @@ GeometryResult EstimateGeometry(const acquire::SessionReader& session,
   cv::Mat intrinsics_sigma;
   cv::Mat extrinsics_sigma;
   cv::Mat view_errors;
+  const internal::OneThreadAlgebra one_thread;
   const double rms_px = cv::calibrateCamera(
       points_mm,
       corners_px,

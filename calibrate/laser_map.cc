@@ -1,6 +1,7 @@
 #include "calibrate/laser_map.h"
 
 #include "calibrate/hysteresis.h"
+#include "calibrate/internal/one_thread_algebra.h"
 #include "calibrate/internal/pictures.h"
 #include "core/error.h"
 
@@ -39,6 +40,7 @@ Affine FitAffine(const std::vector<PointMm>& from, const std::vector<PointMm>& t
     right(row, 0) = to[k].x;
     right(row, 1) = to[k].y;
   }
+  const internal::OneThreadAlgebra one_thread;
   cv::Mat_<double> s;
   cv::solve(design, right, s, cv::DECOMP_SVD);
   return {s(0, 0), s(1, 0), s(0, 1), s(1, 1), s(2, 0), s(2, 1)};

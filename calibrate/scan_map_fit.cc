@@ -1,3 +1,4 @@
+#include "calibrate/internal/one_thread_algebra.h"
 #include "calibrate/laser_map.h"
 #include "core/error.h"
 
@@ -23,6 +24,7 @@ acquire::Cubic FitCubic(const std::vector<PointMm>& inputs,
     std::copy(monomials.begin(), monomials.end(), design[row]);
     right(row, 0) = outputs[k];
   }
+  const internal::OneThreadAlgebra one_thread;
   cv::Mat_<double> solution;
   if (!cv::solve(design, right, solution, cv::DECOMP_SVD)) {
     throw BadData("the laser's spots don't determine a cubic map");

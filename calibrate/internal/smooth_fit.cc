@@ -1,5 +1,6 @@
 #include "calibrate/internal/smooth_fit.h"
 
+#include "calibrate/internal/one_thread_algebra.h"
 #include "core/error.h"
 
 #include <opencv2/core.hpp>
@@ -63,6 +64,7 @@ SmoothField FitSmoothField(const std::vector<Block>& blocks, int degree) {
       }
     }
   }
+  const OneThreadAlgebra one_thread;
   cv::Mat_<double> solution;
   cv::solve(normal, right, solution, cv::DECOMP_SVD);
   SmoothField field{.degree = degree};
