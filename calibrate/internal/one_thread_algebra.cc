@@ -19,8 +19,8 @@ const OpenBlas& LoadedOpenBlas() {
     for (const char* name : {"libopenblas.so.0", "libopenblas.so"}) {
       void* library = ::dlopen(name, RTLD_NOLOAD | RTLD_LAZY);
       if (library != nullptr) {
-        blas.threads = reinterpret_cast<int (*)()>(
-            ::dlsym(library, "openblas_get_num_threads"));
+        blas.threads =
+            reinterpret_cast<int (*)()>(::dlsym(library, "openblas_get_num_threads"));
         blas.set_threads = reinterpret_cast<void (*)(int)>(
             ::dlsym(library, "openblas_set_num_threads"));
         break;

@@ -60,7 +60,10 @@ class EditedRows {
         const std::size_t back = size - 1 - there;
         for (std::size_t c = 0; c < header_.channels.size(); ++c) {
           float& value = slice.rd[c * size + there];
-          value = std::sqrt(value * theirs.rd[c * size + back]);
+          // In double: a float's product would be 0 or infinite long before its root.
+          value = static_cast<float>(
+              std::sqrt(static_cast<double>(value) *
+                        static_cast<double>(theirs.rd[c * size + back])));
         }
       }
     }

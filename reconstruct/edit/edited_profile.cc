@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 namespace nacre::reconstruct {
@@ -32,8 +33,12 @@ class LogProfile {
  public:
   LogProfile(const RdHeader& header, const Profile& profile)
       : core_(header.core), radius_(header.Radius()) {
+    // Zeros are 30 decades below the peak, whatever the unit.
+    const auto peak =
+        static_cast<double>(*std::max_element(profile.begin(), profile.end()));
+    const double least = std::max(1e-30 * peak, std::numeric_limits<double>::min());
     for (const float value : profile) {
-      log_.push_back(std::log(std::max(static_cast<double>(value), 1e-30)));
+      log_.push_back(std::log(std::max(static_cast<double>(value), least)));
     }
     const auto mean_at = [&](int r) {
       return 0.25 * (At(radius_ - r, radius_) + At(radius_ + r, radius_) +

@@ -214,6 +214,7 @@ ImportSummary ImportArray(const ArrayView& array,
   header.channels = ChannelNames(array_options.channels, scan.extent[kC], origin);
   Provenance provenance{.command = "import", .options = OptionsToJson(options)};
   provenance.options.update(OptionsToJson(array_options));
+  provenance.options["from"] = array.format;
   provenance.AddInput(from);
   header.provenance = provenance.ToString();
   Validate(header, origin);

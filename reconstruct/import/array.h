@@ -44,6 +44,7 @@ struct ArrayView {
   const unsigned char* data = nullptr;
   NumberType type = NumberType::kFloat32;
   bool big_endian = false;
+  const char* format = "npy";  ///< of the file, as `nacre import --from` calls it
   std::vector<std::int64_t> extent;
   std::vector<std::int64_t> stride_bytes;
 };

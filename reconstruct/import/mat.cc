@@ -192,6 +192,7 @@ ImportSummary ImportMat(const std::filesystem::path& from,
   }
   array.data = static_cast<const unsigned char*>(variable->data);
   array.big_endian = std::endian::native == std::endian::big;
+  array.format = "mat";
   std::int64_t stride = SizeOf(*type);  // the first axis runs fastest
   for (const std::int64_t extent : array.extent) {
     array.stride_bytes.push_back(stride);

@@ -11,12 +11,15 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 namespace nacre::reconstruct::internal {
 namespace {
 
 constexpr std::uint64_t kSampleStream = 0x73616D70;
 constexpr int kSlicesAtOnce = 8;
+// Slices whose peak has no finite inverse count as dark: denormal numbers.
+constexpr float kLeastPeak = std::numeric_limits<float>::min();
 
 // sums[slice][lane] = Σ_k shapes[slice][k] · components[k][lane], for sixteen columns.
 __attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumns(
@@ -127,11 +130,13 @@ SliceFeatures::SliceFeatures(const RdHeader& header,
                               std::span(slice.valid).subspan(begin, window_));
       for (std::size_t k = begin; peak > 0 && k < begin + window_; ++k) {
         // d ln(R/peak + o) = σ / (R + o · peak)
-        const float deviation =
+        const double deviation =
             slice.valid[k] != 0
-                ? slice.sigma[k] / (std::max(0.0F, slice.rd[k]) + offset_ * peak)
-                : 0.0F;
-        noise[k] += static_cast<double>(deviation) * static_cast<double>(deviation);
+                ? static_cast<double>(slice.sigma[k]) /
+                      (static_cast<double>(std::max(0.0F, slice.rd[k])) +
+                       static_cast<double>(offset_) * static_cast<double>(peak))
+                : 0.0;
+        noise[k] += deviation * deviation;
       }
     }
   }
@@ -159,7 +164,7 @@ void SliceFeatures::Shape(const SliceView& slice, std::span<float> shape) const 
     LogShape(rd.data(),
              valid.data(),
              mean_weight.data(),
-             {peak > 0 ? 1.0F / peak : 0.0F, offset_},
+             {peak > kLeastPeak ? 1.0F / peak : 0.0F, offset_},
              shape.subspan(begin, window_));
   }
 }
