@@ -14,6 +14,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace nacre::cli {
@@ -150,6 +151,9 @@ void RunBeam(Task& task) {
       {&x_i, 1},
       [&](std::size_t, rigs::Window&& solved) { window = std::move(solved); },
       ConsoleProgress(task.common));
+  if (!task.common.IsRoot()) {
+    return;
+  }
   WriteExr(task.args.out,
            {SlicePart(task, "rd", window.rd), SlicePart(task, "stderr", window.sigma)});
   const WindowFigures figures = FiguresOf(task.phantom, window);
@@ -171,6 +175,9 @@ void RunPhoto(Task& task) {
                                             parts.front(),
                                             task.options,
                                             ConsoleProgress(task.common));
+  if (!task.common.IsRoot()) {
+    return;
+  }
   photo.exitance.name = "exitance";
   photo.exitance.attributes = {{"nacre.provenance", task.provenance.ToString()}};
   std::vector<ExrPart> result{std::move(photo.exitance)};
@@ -195,7 +202,10 @@ void RunDataset(Task& task) {
                         .eta = phantom.slab.eta,
                         .channels = phantom.channels,
                         .provenance = task.provenance.ToString()};
-  RdWriter writer(task.args.out, header);
+  std::optional<RdWriter> writer;
+  if (task.common.IsRoot()) {
+    writer.emplace(task.args.out, header);
+  }
   double worst_noise = 0;
   const rigs::GridSummary summary = rigs::SolveGrid(
       *selection.transport,
@@ -204,10 +214,13 @@ void RunDataset(Task& task) {
         RdSlice slice = reconstruct::MakeSlice(header);
         slice.rd = std::move(window.rd);
         slice.sigma = std::move(window.sigma);
-        writer.WriteSlice(i, j, slice);
+        writer->WriteSlice(i, j, slice);
       },
       ConsoleProgress(task.common));
-  writer.Finish();
+  if (!task.common.IsRoot()) {
+    return;
+  }
+  writer->Finish();
   SayIfMissed(task, worst_noise);
   Print(task.common,
         Merged({{"file", task.args.out.string()},
@@ -250,6 +263,7 @@ int Run(const SimulateArguments& args, const Common& common) {
   Task task{args, common, {}, args.options, {}, CpuSeconds()};
   task.options.seed = static_cast<std::int64_t>(common.seed);
   task.options.thread_count = common.thread_count;
+  task.options.ranks = common.ranks;
   Validate(task.options);
   task.phantom = rigs::ReadPhantom(args.phantom);
   task.provenance.command = "simulate";

@@ -2,8 +2,8 @@
 
 #include "core/error.h"
 #include "core/fresnel.h"
-#include "core/parallel.h"
 #include "rigs/transport/monte_carlo/monte_carlo_transport.h"
+#include "rigs/transport/solve_units.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,11 +59,24 @@ struct Scene {
   std::vector<std::size_t> image_channel;  // of each of the phantom's
 };
 
-// Adds what leaves because of the light that falls on one pixel.
+// The rows of a picture that the light on one row can leave by.
+struct Band {
+  int first = 0;
+  int count = 0;
+  Band(const acquire::GridDescription& grid, int row)
+      : first(std::max(0, row - grid.core / 2)),
+        count(std::min(grid.points_y - 1, row + grid.core / 2) - first + 1) {}
+  std::size_t Pixels(const acquire::GridDescription& grid) const {
+    return static_cast<std::size_t>(count) * static_cast<std::size_t>(grid.points_x);
+  }
+};
+
+// Adds what leaves because of the light that falls on one pixel to its row's band,
+// channel after channel.
 void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exitance) {
   const Phantom& phantom = scene.transport->phantom();
   const acquire::GridDescription& grid = phantom.grid;
-  const std::size_t pixels = scene.image->PixelCount();
+  const Band band(grid, row);
   const auto at = static_cast<std::size_t>(row * grid.points_x + column);
   const auto light = [&](std::size_t c) {
     return scene.image->Channel(scene.image_channel[c])[at];
@@ -83,15 +96,14 @@ void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exita
   const int last_column = std::min(grid.points_x - 1, column + radius);
   for (std::size_t c = 0; c < phantom.channels.size(); ++c) {
     const float flux = entering * light(c);
-    for (int y = std::max(0, row - radius);
-         y <= std::min(grid.points_y - 1, row + radius);
-         ++y) {
+    for (int y = band.first; y < band.first + band.count; ++y) {
       const std::size_t from = (c * static_cast<std::size_t>(grid.core) +
                                 static_cast<std::size_t>(y - row + radius)) *
                                    static_cast<std::size_t>(grid.core) +
                                static_cast<std::size_t>(first_column - column + radius);
       const std::size_t to =
-          c * pixels + static_cast<std::size_t>(y * grid.points_x + first_column);
+          c * band.Pixels(grid) +
+          static_cast<std::size_t>((y - band.first) * grid.points_x + first_column);
       const auto count = static_cast<std::size_t>(last_column - first_column + 1);
       for (std::size_t k = 0; k < count; ++k) {
         exitance[to + k] += flux * window.rd[from + k];
@@ -214,37 +226,41 @@ Photo PhotographUnder(const Phantom& phantom,
   if (solver == Solver::kMonteCarlo) {
     return PhotographByPhotons(by_pixel, illumination, options, progress);
   }
-  by_pixel.grid.core = CoreFor(by_pixel, solver, options);
-  const auto transport = MakeTransport(by_pixel, solver, options);
+  // What every rank does by itself: the solver is asked from many threads.
+  SolverOptions alone = options;
+  alone.ranks = nullptr;
+  by_pixel.grid.core = CoreFor(by_pixel, solver, alone);
+  const auto transport = MakeTransport(by_pixel, solver, alone);
   const Scene scene{
       transport.get(), &illumination, ImageChannels(phantom, illumination)};
+  const acquire::GridDescription& grid = transport->phantom().grid;
+  const std::size_t channels = phantom.channels.size();
   Photo photo{BlackPicture(phantom, illumination), {}};
-  std::vector<float>& values = photo.exitance.values;
-  // Pictures of parts of the light, added in order: the same sum on any thread count.
-  constexpr int kParts = 8;
-  for (int first_row = 0; first_row < illumination.height; first_row += kParts) {
-    std::vector<std::vector<float>> parts(kParts);
-    ParallelFor(kParts, options.thread_count, [&](std::int64_t part) {
-      const int row = first_row + static_cast<int>(part);
-      if (row < illumination.height) {
-        auto& exitance = parts[static_cast<std::size_t>(part)];
-        exitance.assign(values.size(), 0.0F);
+  constexpr std::int64_t kAtOnce = 8;
+  SolveUnits(
+      {.ranks = options.ranks,
+       .thread_count = options.thread_count,
+       .at_once = kAtOnce},
+      illumination.height,
+      [&](std::int64_t unit) {
+        const int row = static_cast<int>(unit);
+        std::vector<float> exitance(channels * Band(grid, row).Pixels(grid), 0.0F);
         for (int column = 0; column < illumination.width; ++column) {
           AddPixel(scene, column, row, exitance);
         }
-      }
-    });
-    for (const std::vector<float>& part : parts) {
-      for (std::size_t k = 0; k < part.size(); ++k) {
-        values[k] += part[k];
-      }
-    }
-    Report(progress,
-           {"photo",
-            std::min(first_row + kParts, illumination.height),
-            illumination.height,
-            ""});
-  }
+        return exitance;
+      },
+      [&](std::int64_t row, std::span<const float> exitance) {
+        const Band band(grid, static_cast<int>(row));
+        for (std::size_t c = 0; c < channels; ++c) {
+          float* to = photo.exitance.Channel(c) +
+                      static_cast<std::ptrdiff_t>(band.first) * grid.points_x;
+          for (std::size_t k = 0; k < band.Pixels(grid); ++k) {
+            to[k] += exitance[c * band.Pixels(grid) + k];
+          }
+        }
+        Report(progress, {"photo", row + 1, illumination.height, ""});
+      });
   return photo;
 }
 

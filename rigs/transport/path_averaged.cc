@@ -137,8 +137,8 @@ RadialTable RoundBeamTable(const Phantom& phantom,
 
 }  // namespace
 
-PathAveraged::PathAveraged(const Phantom& phantom, int thread_count)
-    : Transport(thread_count), phantom_(phantom), beam_(1) {
+PathAveraged::PathAveraged(const Phantom& phantom, int thread_count, const Ranks* ranks)
+    : Transport(thread_count, ranks), phantom_(phantom), beam_(1) {
   CheckPhantom(phantom);
   constexpr double kLossBeyondReach = 1e-4;
   const Beam& beam = phantom.beam;

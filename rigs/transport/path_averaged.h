@@ -22,7 +22,9 @@ class PathAveraged final : public Transport {
  public:
   /// Tabulates the model. Throws BadData for what diffusion can't do: a medium without
   /// scattering, a slab thinner than a mean free path, an oblique beam.
-  explicit PathAveraged(const Phantom& phantom, int thread_count = 0);
+  explicit PathAveraged(const Phantom& phantom,
+                        int thread_count = 0,
+                        const Ranks* ranks = nullptr);
 
   const Phantom& phantom() const override { return phantom_; }
   Window WindowAround(PointMm x_i) const override;

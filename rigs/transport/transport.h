@@ -13,6 +13,10 @@
 #include <string>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::rigs {
 
 /// R_d(x_i, ·) around one x_i: channel after channel, each core × core, row by row from
@@ -35,11 +39,15 @@ struct Totals {
   std::int64_t photons = 0;  ///< they are known from
 };
 
-/// A solver for one phantom. All of it is const and may be called from several threads.
+/// A solver for one phantom. All of it is const and may be called from several threads,
+/// unless work is shared among ranks: then every rank has to make the same calls in the
+/// same order, from one thread.
 class Transport {
  public:
-  /// `thread_count`: of calls that say nothing else; 0: all cores.
-  explicit Transport(int thread_count = 0) : thread_count_(thread_count) {}
+  /// `thread_count`: of calls that say nothing else; 0: all cores. `ranks`: among whom
+  /// the work is shared; null: nobody.
+  explicit Transport(int thread_count = 0, const Ranks* ranks = nullptr)
+      : thread_count_(thread_count), ranks_(ranks) {}
   virtual ~Transport() = default;
   virtual const Phantom& phantom() const = 0;
 
@@ -47,8 +55,8 @@ class Transport {
   virtual Window WindowAround(PointMm x_i) const = 0;
 
   /// The windows of many x_i. `use(k, window)` is called for every k, one call at a
-  /// time, in no particular order; few windows are in memory at once. Throws
-  /// Interrupted.
+  /// time, in no particular order, and at the root alone; few windows are in memory at
+  /// once. Throws Interrupted.
   virtual void SolveWindows(
       std::span<const PointMm> points,
       const std::function<void(std::size_t k, Window&& window)>& use,
@@ -67,8 +75,19 @@ class Transport {
 
   virtual Totals TotalsAt(PointMm x_i, std::size_t channel) const = 0;
 
+ protected:
+  /// For SolveWindows(): the windows of each unit, whose points have the given indices,
+  /// by all threads and ranks.
+  void SolveInUnits(const std::vector<std::vector<std::size_t>>& units,
+                    const std::function<std::vector<Window>(std::size_t unit)>& solve,
+                    const std::function<void(std::size_t k, Window&& window)>& use,
+                    const ProgressFunction& progress) const;
+
+  const Ranks* ranks() const { return ranks_; }
+
  private:
   int thread_count_;
+  const Ranks* ranks_;
 };
 
 /// The solvers of this build, by the names that `nacre simulate --solver` takes.
@@ -92,6 +111,7 @@ struct SolverOptions {
   bool near_field = true;
   std::int64_t seed = 1;
   int thread_count = 0;
+  const Ranks* ranks = nullptr;  ///< see Transport
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/fresnel.h"
 #include "tests/rigs/phantoms.h"
+#include "tests/support/thread_ranks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -53,6 +54,26 @@ TEST(Photo, IsLinearAndPutsLightWhereItFell) {
   const ExrPart other = PhotographUnder(phantom, Solver::kFast, rest, 2);
   for (std::size_t k = 0; k < both.values.size(); ++k) {
     EXPECT_NEAR(both.values[k], one.values[k] + other.values[k], 1e-6);
+  }
+}
+
+TEST(Photo, RanksShareItAndGiveTheSameBits) {
+  ExrPart stripe = Image(24, 16, 0);
+  for (std::size_t k = 0; k < stripe.values.size(); k += 5) {
+    stripe.values[k] = 1 + static_cast<float>(k);
+  }
+  for (const Solver solver : {Solver::kFast, Solver::kMonteCarlo}) {
+    SolverOptions options{.photons = 5000, .thread_count = 1};
+    const Photo alone = PhotographUnder(TestPhantom(), solver, stripe, options);
+    nacre::testing::OnThreadRanks(3, [&](const Ranks& ranks) {
+      SolverOptions shared = options;
+      shared.ranks = &ranks;
+      const Photo photo = PhotographUnder(TestPhantom(), solver, stripe, shared);
+      if (ranks.IsRoot()) {
+        EXPECT_EQ(photo.exitance.values, alone.exitance.values) << Name(solver);
+        EXPECT_EQ(photo.standard_error.values, alone.standard_error.values);
+      }
+    });
   }
 }
 

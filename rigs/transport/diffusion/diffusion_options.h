@@ -4,6 +4,10 @@
 
 #include <cstdint>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::rigs {
 
 struct DiffusionOptions {
@@ -17,6 +21,7 @@ struct DiffusionOptions {
   bool classical_coefficient = false;
   bool reciprocal_exit = false;
   int thread_count = 0;
+  const Ranks* ranks = nullptr;  ///< see Transport
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {

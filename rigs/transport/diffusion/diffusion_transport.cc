@@ -1,7 +1,6 @@
 #include "rigs/transport/diffusion/diffusion_transport.h"
 
 #include "core/error.h"
-#include "core/parallel.h"
 #include "rigs/pattern_mixture.h"
 #include "rigs/transport/diffusion/internal/diffusion_state.h"
 #include "rigs/transport/diffusion/monte_carlo_profile.h"
@@ -11,7 +10,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <mutex>
 #include <utility>
 #include <vector>
 
@@ -66,7 +64,8 @@ DiffusionTransport::Channel DiffusionTransport::Impl::MakeChannel(
                                               .last_mm = last_mm,
                                               .photon_count = options.reference_photons,
                                               .seed = options.reference_seed,
-                                              .thread_count = options.thread_count},
+                                              .thread_count = options.thread_count,
+                                              .ranks = options.ranks},
                                              RobinSlab(setup.substances[m].slab));
     } else {
       profile = [exact = RobinSlab(setup.substances[m].slab)](double r_mm) {
@@ -92,7 +91,8 @@ DiffusionTransport::Channel DiffusionTransport::Impl::MakeChannel(
 
 DiffusionTransport::DiffusionTransport(const Phantom& phantom,
                                        const DiffusionOptions& options,
-                                       const ReferenceProfile& reference) {
+                                       const ReferenceProfile& reference)
+    : Transport(options.thread_count, options.ranks) {
   Validate(options);
   RequirePlanePattern(phantom, "the diffusion solver");
   if (phantom.beam.angle_rad != 0) {
@@ -283,28 +283,22 @@ void DiffusionTransport::SolveWindows(
   Expect(impl_->phantom.grid.points_x > 0, "a phantom with a grid");
   const std::vector<Neighbourhood> places =
       diffusion::GroupPoints(points, impl_->phantom.grid, LocalDomain<float>::kLanes);
-  std::mutex mutex;
-  std::int64_t done = 0;
-  const auto total = static_cast<std::int64_t>(points.size());
-  ParallelFor(static_cast<std::int64_t>(places.size()),
-              impl_->options.thread_count,
-              [&](std::int64_t p) {
-                const Neighbourhood& place = places[static_cast<std::size_t>(p)];
-                std::vector<Window> windows = impl_->Solve(place);
-                const std::lock_guard lock(mutex);
-                for (std::size_t lane = 0; lane < windows.size(); ++lane) {
-                  use(place.indices[lane], std::move(windows[lane]));
-                }
-                done += static_cast<std::int64_t>(windows.size());
-                Report(progress, {"simulate", done, total, ""});
-              });
+  std::vector<std::vector<std::size_t>> units;
+  for (const Neighbourhood& place : places) {
+    units.push_back(place.indices);
+  }
+  SolveInUnits(
+      units,
+      [&](std::size_t unit) { return impl_->Solve(places[unit]); },
+      use,
+      progress);
 }
 
 Window DiffusionTransport::WindowAround(PointMm x_i) const {
-  Window result;
-  SolveWindows(std::array{x_i},
-               [&](std::size_t, Window&& window) { result = std::move(window); });
-  return result;
+  Expect(impl_->phantom.grid.points_x > 0, "a phantom with a grid");
+  const std::vector<Neighbourhood> places = diffusion::GroupPoints(
+      std::array{x_i}, impl_->phantom.grid, LocalDomain<float>::kLanes);
+  return std::move(impl_->Solve(places.front()).front());
 }
 
 LocalDomain<float>::Budget DiffusionTransport::Impl::BudgetAt(

@@ -19,7 +19,7 @@ constexpr double kFewestPhotons = 2000;
 
 // ∫ model 2πr dr over a ring; v² calms what the model does at r = 0.
 double ModelFlux(const RobinSlab& model, double from_mm, double to_mm) {
-  const internal::GaussRule rule = internal::GaussLegendre(8);
+  const rigs::internal::GaussRule rule = rigs::internal::GaussLegendre(8);
   double sum = 0;
   for (std::size_t k = 0; k < rule.node.size(); ++k) {
     const double v = 0.5 * (1 + rule.node[k]);
@@ -64,7 +64,8 @@ monte_carlo::Result Count(const Phantom& phantom,
       {.ring_count = std::min(rings, kMostRings), .ring_width_mm = ring_mm},
       {.photon_count = request.photon_count,
        .seed = request.seed,
-       .thread_count = request.thread_count});
+       .thread_count = request.thread_count,
+       .ranks = request.ranks});
 }
 
 }  // namespace

@@ -7,6 +7,10 @@
 #include <cstdint>
 #include <functional>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::rigs::diffusion {
 
 struct MonteCarloProfileRequest {
@@ -16,6 +20,7 @@ struct MonteCarloProfileRequest {
   std::int64_t photon_count = 0;
   std::int64_t seed = 1;
   int thread_count = 0;
+  const Ranks* ranks = nullptr;
 };
 
 /// R_d(r), mm⁻², of a homogeneous slab of one of the phantom's media lit by a pencil:

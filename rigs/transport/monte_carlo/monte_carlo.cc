@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/ranks.h"
 #include "rigs/transport/monte_carlo/internal/packet.h"
 #include "rigs/transport/monte_carlo/symmetry.h"
 #include "rigs/transport/monte_carlo/tally.h"
@@ -73,16 +74,60 @@ struct Simulation::State {
             .source = source,
             .seed = static_cast<std::uint64_t>(options.seed)},
         total(request, volume.media.size()),
-        thread_count(options.thread_count) {}
+        thread_count(options.thread_count),
+        ranks(options.ranks) {}
 
   Volume volume;
   TallyRequest request;
   internal::PacketJob job;
   CountTally total;
   int thread_count;
+  const Ranks* ranks;
   std::int64_t photon_count = 0;
   double cpu_seconds = 0;
+
+  void Follow(std::int64_t first,
+              std::int64_t last,
+              const ProgressFunction& progress,
+              CountTally& result);
 };
+
+// Photons number `first` to before `last`, on all threads of this rank.
+void Simulation::State::Follow(std::int64_t first,
+                               std::int64_t last,
+                               const ProgressFunction& progress,
+                               CountTally& result) {
+  std::int64_t done = first;
+  // As many tallies as threads: a window may be large.
+  std::vector<std::unique_ptr<CountTally>> idle;
+  std::mutex mutex;
+  const auto take = [&]() -> std::unique_ptr<CountTally> {
+    const std::lock_guard<std::mutex> lock(mutex);
+    if (idle.empty()) {
+      return std::make_unique<CountTally>(request, volume.media.size());
+    }
+    std::unique_ptr<CountTally> tally = std::move(idle.back());
+    idle.pop_back();
+    return tally;
+  };
+  ParallelForBlocks(last - first,
+                    BlockSize(last - first, thread_count),
+                    thread_count,
+                    [&](std::int64_t begin, std::int64_t end) {
+                      std::unique_ptr<CountTally> tally = take();
+                      const double start = ThreadCpuSeconds();
+                      internal::RunPhotons(job, first + begin, first + end, *tally);
+                      const double seconds = ThreadCpuSeconds() - start;
+                      const std::lock_guard<std::mutex> lock(mutex);
+                      idle.push_back(std::move(tally));
+                      cpu_seconds += seconds;
+                      done += end - begin;
+                      Report(progress, {"monte carlo", done, last, "photons"});
+                    });
+  for (const std::unique_ptr<CountTally>& tally : idle) {
+    result.Merge(*tally);
+  }
+}
 
 Simulation::Simulation(const Volume& volume,
                        const Source& source,
@@ -99,38 +144,16 @@ Simulation::~Simulation() = default;
 
 void Simulation::Add(std::int64_t photon_count, const ProgressFunction& progress) {
   State& s = *state_;
-  const std::int64_t first = s.photon_count;
-  std::int64_t done = first;
-  // As many tallies as threads: a window may be large.
-  std::vector<std::unique_ptr<CountTally>> idle;
-  std::mutex mutex;
-  const auto take = [&]() -> std::unique_ptr<CountTally> {
-    const std::lock_guard<std::mutex> lock(mutex);
-    if (idle.empty()) {
-      return std::make_unique<CountTally>(s.request, s.volume.media.size());
-    }
-    std::unique_ptr<CountTally> tally = std::move(idle.back());
-    idle.pop_back();
-    return tally;
-  };
-  ParallelForBlocks(
-      photon_count,
-      BlockSize(photon_count, s.thread_count),
-      s.thread_count,
-      [&](std::int64_t begin, std::int64_t end) {
-        std::unique_ptr<CountTally> tally = take();
-        const double start = ThreadCpuSeconds();
-        internal::RunPhotons(s.job, first + begin, first + end, *tally);
-        const double seconds = ThreadCpuSeconds() - start;
-        const std::lock_guard<std::mutex> lock(mutex);
-        idle.push_back(std::move(tally));
-        s.cpu_seconds += seconds;
-        done += end - begin;
-        Report(progress, {"monte carlo", done, first + photon_count, "photons"});
-      });
-  for (const std::unique_ptr<CountTally>& tally : idle) {
-    s.total.Merge(*tally);
+  // The photons are numbered through, so that it doesn't matter who follows which.
+  const RankShare share = ShareOf(photon_count, s.ranks);
+  CountTally added(s.request, s.volume.media.size());
+  s.Follow(s.photon_count + share.begin, s.photon_count + share.end, progress, added);
+  if (s.ranks != nullptr && s.ranks->size() > 1) {
+    std::vector<std::int64_t> counts = added.Counts();
+    s.ranks->Sum(counts);
+    added.SetCounts(counts);
   }
+  s.total.Merge(added);
   s.photon_count += photon_count;
 }
 

@@ -10,12 +10,18 @@
 #include <string>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::rigs::monte_carlo {
 
 struct Options {
   std::int64_t photon_count = 1'000'000;
   std::int64_t seed = 1;
   int thread_count = 0;
+  /// Among whom the photons are shared; null: nobody. All ranks make the same calls.
+  const Ranks* ranks = nullptr;
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -67,14 +73,14 @@ struct Result {
   std::vector<Estimate> absorbed_in_depth;  ///< fractions
 
   std::int64_t step_count = 0;  ///< flights between tentative collisions or interfaces
-  double cpu_seconds = 0;       ///< of all threads
+  double cpu_seconds = 0;       ///< of all threads of this rank
 };
 
 /// Simulates photons one by one without any approximation but the rounding of single
 /// precision (positions and directions; counts are integers). The result depends on
-/// the seed and the photon count alone: not on the threads, nor on the machine's
-/// instruction set. Throws BadData as Validate does, UsageError for bad options, and
-/// Interrupted.
+/// the seed and the photon count alone: not on the threads or ranks, nor on the
+/// machine's instruction set. Throws BadData as Validate does, UsageError for bad
+/// options, and Interrupted.
 Result Simulate(const Volume& volume,
                 const Source& source,
                 const TallyRequest& request,

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/ranks.h"
 #include "rigs/transport/monte_carlo/tally.h"
 
 #include <algorithm>
@@ -12,6 +13,7 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 
 namespace nacre::rigs::monte_carlo {
 namespace {
@@ -132,7 +134,8 @@ MonteCarloTransport::MonteCarloTransport(const Phantom& phantom,
                                          const Options& options,
                                          const BeamOptions& beam_options,
                                          const ProgressFunction& progress)
-    : phantom_(phantom),
+    : Transport(options.thread_count, options.ranks),
+      phantom_(phantom),
       options_(options),
       beam_options_(beam_options),
       progress_(progress) {
@@ -226,7 +229,10 @@ void MonteCarloTransport::SolveWindows(
   const auto count = static_cast<std::int64_t>(points.size());
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    use(at, WindowAround(points[at], PartOf(progress, k, count)));
+    Window window = WindowAround(points[at], PartOf(progress, k, count));
+    if (ranks() == nullptr || ranks()->IsRoot()) {
+      use(at, std::move(window));
+    }
   }
 }
 

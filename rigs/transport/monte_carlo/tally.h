@@ -2,10 +2,12 @@
 
 #include "rigs/transport/monte_carlo/monte_carlo.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <numbers>
 #include <vector>
 
@@ -116,6 +118,18 @@ class Tally {
 
   void AddSteps(std::int64_t count) { step_count_ += count; }
 
+  /// All integers of it, to be added to another's of the same request.
+  std::vector<std::int64_t> Counts() const {
+    std::vector<std::int64_t> counts{step_count_};
+    ForEachCell(*this, [&](const Cell& cell) { counts.push_back(cell.count); });
+    return counts;
+  }
+  void SetCounts(const std::vector<std::int64_t>& counts) {
+    std::size_t k = 0;
+    step_count_ = counts.at(k++);
+    ForEachCell(*this, [&](Cell& cell) { cell.count = counts.at(k++); });
+  }
+
   void Merge(const Tally& other) {
     for (std::size_t k = 0; k < kFateCount; ++k) {
       fate_[k].Merge(other.fate_[k]);
@@ -200,6 +214,20 @@ class Tally {
       if (ring < Size(ring_)) {
         ring_[static_cast<std::size_t>(ring)].Add(weight);
       }
+    }
+  }
+
+  template <class Self, class Use>
+  static void ForEachCell(Self& self, Use use) {
+    std::for_each(self.fate_.begin(), self.fate_.end(), std::ref(use));
+    use(self.unscattered_);
+    for (auto* table : {&self.medium_,
+                        &self.window_,
+                        &self.ring_,
+                        &self.reflected_cosine_,
+                        &self.transmitted_cosine_,
+                        &self.depth_}) {
+      std::for_each(table->begin(), table->end(), std::ref(use));
     }
   }
 

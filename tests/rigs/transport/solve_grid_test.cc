@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "tests/rigs/phantoms.h"
+#include "tests/support/thread_ranks.h"
 
 #include <gtest/gtest.h>
 
@@ -49,6 +50,32 @@ TEST(SolveGrid, RepeatedPointsAreSolvedOnceAndRight) {
     ASSERT_EQ(solved.windows[k].rd.size(), direct.rd.size());
     for (std::size_t c = 0; c < direct.rd.size(); ++c) {
       EXPECT_NEAR(solved.windows[k].rd[c], direct.rd[c], 2e-3F * direct.rd[c]);
+    }
+  }
+}
+
+// The root gets all windows, with the bits that one process makes; others get none.
+TEST(SolveGrid, RanksShareItsWorkAndGiveTheSameBits) {
+  Phantom phantom = Board();
+  phantom.grid.points_x = 7;
+  for (const Solver solver : {Solver::kFast, Solver::kDiffusion, Solver::kMonteCarlo}) {
+    SolverOptions options{.photons = 2000, .near_field = false, .thread_count = 1};
+    const Solved alone = Solve(*MakeTransport(phantom, solver, options));
+    for (const int size : {2, 3}) {
+      nacre::testing::OnThreadRanks(size, [&](const Ranks& ranks) {
+        SolverOptions shared = options;
+        shared.ranks = &ranks;
+        const Solved solved = Solve(*MakeTransport(phantom, solver, shared));
+        for (std::size_t k = 0; k < solved.windows.size(); ++k) {
+          if (!ranks.IsRoot()) {
+            ASSERT_TRUE(solved.windows[k].rd.empty()) << Name(solver);
+            continue;
+          }
+          ASSERT_EQ(solved.windows[k].rd, alone.windows[k].rd) << Name(solver);
+          ASSERT_EQ(solved.windows[k].sigma, alone.windows[k].sigma) << Name(solver);
+        }
+        EXPECT_GT(ranks.traffic().messages_sent + ranks.traffic().messages_received, 0);
+      });
     }
   }
 }
