@@ -17,6 +17,9 @@ namespace nacre::python {
 
 namespace py = pybind11;
 
+/// Any array, as floats without gaps.
+using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
+
 /// The parts of the module.
 void AddSamples(py::module_& module);
 void AddPictures(py::module_& module);

@@ -14,8 +14,6 @@
 namespace nacre::python {
 namespace {
 
-using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
-
 // [channel][row][column] in memory, seen as rows, columns, channels.
 py::array Pixels(const py::object& self) {
   auto& part = self.cast<ExrPart&>();

@@ -15,7 +15,6 @@ namespace {
 using factor::Material;
 using reconstruct::RdDataset;
 using reconstruct::RdHeader;
-using Floats = py::array_t<float, py::array::c_style | py::array::forcecast>;
 using Bytes = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>;
 
 std::vector<py::ssize_t> ShapeOf(const RdHeader& header) {

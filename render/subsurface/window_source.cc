@@ -103,18 +103,23 @@ factor::Material WithinError(const factor::Material& channel, double error) {
   return fewer;
 }
 
+// The grid, as a material's header and a dataset's both have it.
+template <class Header>
+void SetGrid(const Header& header, WindowSource& source) {
+  source.points_x = header.points_x;
+  source.points_y = header.points_y;
+  source.core = header.core;
+  source.pitch_mm = header.pitch_mm;
+  source.eta = header.eta;
+  source.channels = header.channels;
+}
+
 class MaterialFileSource final : public WindowSource {
  public:
   MaterialFileSource(const std::filesystem::path& path, double error)
       : file_(path), error_(error), channels_(file_.header().channels.size()) {
-    const factor::Material& header = file_.header();
-    points_x = header.points_x;
-    points_y = header.points_y;
-    core = header.core;
-    pitch_mm = header.pitch_mm;
-    eta = header.eta;
-    channels = header.channels;
-    if (header.is_grey) {
+    SetGrid(file_.header(), *this);
+    if (file_.header().is_grey) {
       channels.resize(1);
     }
   }
@@ -163,15 +168,9 @@ class MaterialFileSource final : public WindowSource {
 class DatasetSource final : public WindowSource {
  public:
   explicit DatasetSource(const std::filesystem::path& path) : reader_(path) {
-    const reconstruct::RdHeader& header = reader_.header();
-    points_x = header.points_x;
-    points_y = header.points_y;
-    core = header.core;
-    pitch_mm = header.pitch_mm;
-    eta = header.eta;
-    channels = header.channels;
+    SetGrid(reader_.header(), *this);
     slices_ = std::vector<std::atomic<const std::vector<float>*>>(
-        static_cast<std::size_t>(header.PointCount()));
+        static_cast<std::size_t>(reader_.header().PointCount()));
   }
   ~DatasetSource() override {
     for (const auto& slice : slices_) {
