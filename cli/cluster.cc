@@ -22,11 +22,15 @@ int Run(const Arguments& args, const Common& common) {
   reconstruct::ClusterOptions options = args.options;
   options.seed = common.seed;
   options.thread_count = common.thread_count;
+  options.ranks = common.ranks;
   reconstruct::RdReader reader(args.file);
   const reconstruct::RdHeader header = reader.header();
   const reconstruct::Clustering found =
       reconstruct::ClusterSlices(reader, options, ConsoleProgress(common));
 
+  if (!common.IsRoot()) {
+    return 0;
+  }
   Provenance provenance{.command = "cluster", .options = OptionsToJson(options)};
   provenance.options["seed"] = options.seed;
   provenance.AddInput(args.file);

@@ -1,6 +1,7 @@
 #include "reconstruct/clustering.h"
 
 #include "core/parallel.h"
+#include "core/ranks.h"
 #include "reconstruct/internal/gap_statistic.h"
 #include "reconstruct/internal/kmeans.h"
 #include "reconstruct/internal/slice_features.h"
@@ -36,6 +37,19 @@ Clustering Relabel(const KMeansResult& result) {
   return clustering;
 }
 
+// Collective: `own` of all ranks one after the other, in all of them.
+void JoinRows(const Ranks* ranks, std::vector<float>& own) {
+  if (ranks == nullptr) {
+    return;
+  }
+  const auto parts = ranks->AllGather(ToBytes(std::span<const float>(own)));
+  own.clear();
+  for (const std::string& part : parts) {
+    const auto values = FromBytes<float>(part);
+    own.insert(own.end(), values.begin(), values.end());
+  }
+}
+
 // Where slices come from. `view` may use `own` to hold one.
 struct Source {
   std::function<internal::SliceView(std::int64_t s, RdSlice& own)> view;
@@ -56,23 +70,29 @@ PointSet MakePoints(const RdHeader& header,
   }
   const SliceFeatures features(header, sample, options.log_offset, options.dimensions);
   PointSet points{{}, header.PointCount(), features.dimensions()};
-  points.values.resize(static_cast<std::size_t>(points.count * points.dimensions));
+  const RankShare share = ShareOf(points.count, options.ranks);
+  const auto width = static_cast<std::size_t>(points.dimensions);
+  points.values.resize(static_cast<std::size_t>(share.end - share.begin) * width);
   std::vector<RdSlice> own(static_cast<std::size_t>(kSlicesAtOnce));
   std::vector<internal::SliceView> views;
-  for (std::int64_t first = 0; first < points.count; first += kSlicesAtOnce) {
-    Report(progress, {"cluster", first, points.count, "features"});
-    const std::int64_t count = std::min(kSlicesAtOnce, points.count - first);
+  for (std::int64_t first = share.begin; first < share.end; first += kSlicesAtOnce) {
+    Report(progress,
+           {"cluster", first - share.begin, share.end - share.begin, "features"});
+    const std::int64_t count = std::min(kSlicesAtOnce, share.end - first);
     views.clear();
     for (std::int64_t n = 0; n < count; ++n) {
       views.push_back(source.view(first + n, own[static_cast<std::size_t>(n)]));
     }
+    const std::span<float> rows(points.Row(first - share.begin),
+                                static_cast<std::size_t>(count) * width);
     ParallelForBlocks(count, 16, options.thread_count, [&](auto begin, auto end) {
-      features.Project(std::span(views).subspan(static_cast<std::size_t>(begin),
-                                                static_cast<std::size_t>(end - begin)),
-                       {points.Row(first + begin),
-                        static_cast<std::size_t>((end - begin) * points.dimensions)});
+      const auto at = static_cast<std::size_t>(begin);
+      const auto size = static_cast<std::size_t>(end - begin);
+      features.Project(std::span(views).subspan(at, size),
+                       rows.subspan(at * width, size * width));
     });
   }
+  JoinRows(options.ranks, points.values);
   return points;
 }
 
@@ -86,15 +106,17 @@ Clustering Cluster(const RdHeader& header,
   const int clusters =
       options.clusters > 0
           ? options.clusters
-          : internal::ClusterCountByGap(
-                points, kMostByGap, options.seed, options.thread_count);
+          : internal::ClusterCountByGap(points,
+                                        kMostByGap,
+                                        options.seed,
+                                        {options.thread_count, options.ranks});
   Clustering clustering =
       Relabel(internal::BestKMeans(points,
                                    {.clusters = clusters,
                                     .max_iterations = options.iterations,
                                     .seed = options.seed},
                                    options.restarts,
-                                   options.thread_count));
+                                   {options.thread_count, options.ranks}));
   clustering.dimensions_used = points.dimensions;
   return clustering;
 }

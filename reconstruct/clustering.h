@@ -7,6 +7,10 @@
 #include <cstdint>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::reconstruct {
 
 struct ClusterOptions {
@@ -16,8 +20,9 @@ struct ClusterOptions {
   int dimensions = 24;
   double log_offset = 0.003;
 
-  std::uint64_t seed = 1;  ///< of the sample and the first centres
-  int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
+  std::uint64_t seed = 1;        ///< of the sample and the first centres
+  int thread_count = 0;          ///< 0: all cores; doesn't change a bit of the result
+  const Ranks* ranks = nullptr;  ///< nor do these; all get the same
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -53,7 +58,8 @@ struct Clustering {
 /// Groups the points x_i by the shape of R'_d(x_i, ·): k-means [Lloyd82] from
 /// k-means++ seeds [Arthur07] on principal components of the noise-weighted
 /// ln(R'_d / peak + offset), all channels (reconstruct/README.md). The same for any
-/// number of threads.
+/// number of threads and ranks; each rank reads its share of the slices and the sample,
+/// and runs its share of the restarts.
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,
                          const ProgressFunction& progress = {});

@@ -239,7 +239,7 @@ void CompareAssignments(const RdDataset& dataset, int k, int restarts) {
     for (int bounds = 0; bounds < 2; ++bounds) {
       const double start = Seconds();
       results[bounds] = internal::BestKMeans(
-          points, {.clusters = clusters, .use_bounds = bounds == 1}, restarts, 1);
+          points, {.clusters = clusters, .use_bounds = bounds == 1}, restarts, {1});
       seconds[bounds] = Seconds() - start;
     }
     std::printf(

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/ranks.h"
 
 #include <algorithm>
 #include <array>
@@ -53,23 +54,36 @@ PointSet EvenlyAs(const PointSet& points, std::uint64_t seed, std::uint64_t numb
 int ClusterCountByGap(const PointSet& all,
                       int most,
                       std::uint64_t seed,
-                      int thread_count) {
+                      const Workers& workers) {
   const PointSet points = Thin(all);
   most = static_cast<int>(std::min<std::int64_t>(most, points.count - 1));
   // ln of the inertia for k = 1, 2, …, of the points themselves and of the references.
   std::array<std::vector<double>, kReferences + 1> log_inertia;
   bool degenerate = most < 2;
-  ParallelFor(kReferences + 1, thread_count, [&](std::int64_t set) {
+  const RankShare share = ShareOf(kReferences + 1, workers.ranks);
+  ParallelFor(share.end - share.begin, workers.thread_count, [&](std::int64_t n) {
+    const std::int64_t set = share.begin + n;
     const PointSet one =
         set == 0 ? points : EvenlyAs(points, seed, static_cast<std::uint64_t>(set));
     for (int k = 1; k <= most; ++k) {
-      const KMeansResult best =
-          BestKMeans(one, {.clusters = k, .seed = seed}, kRestarts, 1);
+      const KMeansResult best = BestKMeans(
+          one, {.clusters = k, .seed = seed}, kRestarts, {.thread_count = 1});
       // Nothing is left to explain once points coincide.
       log_inertia[static_cast<std::size_t>(set)].push_back(
           std::log(std::max(best.inertia, 1e-30)));
     }
   });
+  if (workers.ranks != nullptr) {
+    for (std::size_t set = 0; set < log_inertia.size(); ++set) {
+      // Of the ranks but one an empty line.
+      for (const std::string& one : workers.ranks->AllGather(
+               ToBytes(std::span<const double>(log_inertia[set])))) {
+        if (!one.empty()) {
+          log_inertia[set] = FromBytes<double>(one);
+        }
+      }
+    }
+  }
   degenerate = degenerate || log_inertia[0][0] < std::log(1e-29);
   double last_gap = 0;
   for (int k = 1; k <= most && !degenerate; ++k) {

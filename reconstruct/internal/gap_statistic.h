@@ -13,6 +13,6 @@ namespace nacre::reconstruct::internal {
 int ClusterCountByGap(const PointSet& points,
                       int most,
                       std::uint64_t seed,
-                      int thread_count);
+                      const Workers& workers);
 
 }  // namespace nacre::reconstruct::internal

@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/ranks.h"
 #include "reconstruct/internal/nearest_centres.h"
 
 #include <algorithm>
@@ -199,6 +200,34 @@ class Lloyd {
   std::vector<Nearest> found_;
 };
 
+// Collective: the result of least inertia, of the first of equal ones, as of runs in
+// one process.
+KMeansResult BestOfRanks(const Ranks& ranks, bool has_one, const KMeansResult& own) {
+  const double inertia =
+      has_one ? own.inertia : std::numeric_limits<double>::infinity();
+  const auto all = ranks.AllGather(ToBytes(std::span<const double>(&inertia, 1)));
+  const auto best = std::min_element(
+      all.begin(), all.end(), [](const std::string& a, const std::string& b) {
+        return FromBytes<double>(a).front() < FromBytes<double>(b).front();
+      });
+  const int winner = static_cast<int>(best - all.begin());
+  const bool is_winner = ranks.rank() == winner;
+  const std::int64_t numbers[] = {own.iterations, own.centre_count, own.distance_count};
+  const auto counts =
+      ranks.AllGather(is_winner ? ToBytes(std::span<const std::int64_t>(numbers)) : "");
+  const auto labels =
+      ranks.AllGather(is_winner ? ToBytes(std::span<const int>(own.labels)) : "");
+  KMeansResult result;
+  const auto from = static_cast<std::size_t>(winner);
+  const auto values = FromBytes<std::int64_t>(counts[from]);
+  result.labels = FromBytes<int>(labels[from]);
+  result.inertia = FromBytes<double>(*best).front();
+  result.iterations = static_cast<int>(values[0]);
+  result.centre_count = static_cast<int>(values[1]);
+  result.distance_count = values[2];
+  return result;
+}
+
 }  // namespace
 
 KMeansResult KMeans(const PointSet& points, const KMeansOptions& options) {
@@ -208,17 +237,21 @@ KMeansResult KMeans(const PointSet& points, const KMeansOptions& options) {
 KMeansResult BestKMeans(const PointSet& points,
                         const KMeansOptions& options,
                         int restarts,
-                        int thread_count) {
-  std::vector<KMeansResult> runs(static_cast<std::size_t>(restarts));
-  ParallelFor(restarts, thread_count, [&](std::int64_t run) {
+                        const Workers& workers) {
+  const RankShare share = ShareOf(restarts, workers.ranks);
+  std::vector<KMeansResult> runs(static_cast<std::size_t>(share.end - share.begin));
+  ParallelFor(std::ssize(runs), workers.thread_count, [&](std::int64_t n) {
     KMeansOptions one = options;
-    one.run = static_cast<std::uint64_t>(run);
-    runs[static_cast<std::size_t>(run)] = KMeans(points, one);
+    one.run = static_cast<std::uint64_t>(share.begin + n);
+    runs[static_cast<std::size_t>(n)] = KMeans(points, one);
   });
-  return std::move(
-      *std::min_element(runs.begin(), runs.end(), [](const auto& a, const auto& b) {
+  const auto best =
+      std::min_element(runs.begin(), runs.end(), [](const auto& a, const auto& b) {
         return a.inertia < b.inertia;
-      }));
+      });
+  KMeansResult own = best != runs.end() ? std::move(*best) : KMeansResult{};
+  return workers.ranks == nullptr ? own
+                                  : BestOfRanks(*workers.ranks, !runs.empty(), own);
 }
 
 }  // namespace nacre::reconstruct::internal

@@ -3,6 +3,10 @@
 #include <cstdint>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::reconstruct::internal {
 
 /// Points row by row, `dimensions` values each.
@@ -40,10 +44,16 @@ struct KMeansOptions {
 /// drawn from (seed, run). Fewer than k centres come out if fewer than k points differ.
 KMeansResult KMeans(const PointSet& points, const KMeansOptions& options);
 
+/// Who does the work, which doesn't change a bit of the result.
+struct Workers {
+  int thread_count = 0;
+  const Ranks* ranks = nullptr;  ///< collective calls, unless null
+};
+
 /// The result of least inertia of `restarts` runs, run side by side.
 KMeansResult BestKMeans(const PointSet& points,
                         const KMeansOptions& options,
                         int restarts,
-                        int thread_count);
+                        const Workers& workers);
 
 }  // namespace nacre::reconstruct::internal

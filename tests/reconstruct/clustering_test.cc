@@ -7,6 +7,7 @@
 #include "reconstruct/cluster_map.h"
 #include "reconstruct/internal/kmeans.h"
 #include "tests/reconstruct/datasets.h"
+#include "tests/support/thread_ranks.h"
 
 #include <gtest/gtest.h>
 
@@ -140,6 +141,25 @@ TEST(Clustering, IsTheSameForAnyNumberOfThreads) {
     const Clustering many = ClusterSlices(dataset, more);
     EXPECT_EQ(many.labels, one.labels);
     EXPECT_EQ(many.inertia, one.inertia);
+  }
+}
+
+TEST(Clustering, IsTheSameForAnyNumberOfRanks) {
+  std::vector<int> planted;
+  const RdDataset dataset = Planted(3, planted);
+  for (const int clusters : {7, 0}) {  // 0: the gap statistic is shared, too
+    const ClusterOptions options{.clusters = clusters, .seed = 3, .thread_count = 1};
+    const Clustering alone = ClusterSlices(dataset, options);
+    for (const int size : {2, 7}) {  // more than restarts
+      nacre::testing::OnThreadRanks(size, [&](const Ranks& ranks) {
+        ClusterOptions shared = options;
+        shared.ranks = &ranks;
+        const Clustering found = ClusterSlices(dataset, shared);
+        EXPECT_EQ(found.labels, alone.labels);
+        EXPECT_EQ(found.inertia, alone.inertia);
+        EXPECT_EQ(found.iterations_used, alone.iterations_used);
+      });
+    }
   }
 }
 
