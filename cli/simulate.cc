@@ -2,6 +2,7 @@
 
 #include "cli/command_line.h"
 #include "cli/simulate_task.h"
+#include "cli/stage_clock.h"
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/options_json.h"

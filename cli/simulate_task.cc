@@ -1,17 +1,13 @@
 #include "cli/simulate_task.h"
 
+#include "cli/stage_clock.h"
 #include "core/error.h"
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <numbers>
 
 namespace nacre::cli {
-
-double CpuSeconds() {
-  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
-}
 
 rigs::Selection SelectFor(SimulateTask& task, rigs::Quantity quantity) {
   using rigs::Solver;

@@ -41,9 +41,6 @@ struct SimulateTask {
   }
 };
 
-/// Of this process so far.
-double CpuSeconds();
-
 /// The solver that was asked for, or the one that "auto" stands for, which is said.
 rigs::Selection SelectFor(SimulateTask& task, rigs::Quantity quantity);
 

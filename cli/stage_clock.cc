@@ -8,12 +8,6 @@
 namespace nacre::cli {
 namespace {
 
-double CpuSeconds() {
-  timespec time{};
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
 double PeakMb() {
   std::ifstream status("/proc/self/status");
   for (std::string line; std::getline(status, line);) {
@@ -28,6 +22,12 @@ double PeakMb() {
 }
 
 }  // namespace
+
+double CpuSeconds() {
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
 
 StageClock::StageClock()
     : start_(std::chrono::steady_clock::now()), cpu_start_(CpuSeconds()) {

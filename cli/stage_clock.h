@@ -4,6 +4,9 @@
 
 namespace nacre::cli {
 
+/// Of all threads of this process so far.
+double CpuSeconds();
+
 struct StageCost {
   double seconds = 0;      ///< of the wall
   double cpu_seconds = 0;  ///< of all threads of the process

@@ -30,6 +30,7 @@ function(nacre_stage name)
   set_target_properties(${target} PROPERTIES
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
+    UNITY_BUILD ${NACRE_UNITY} UNITY_BUILD_BATCH_SIZE 10
     VERIFY_INTERFACE_HEADER_SETS ON)
   target_sources(${target} PUBLIC FILE_SET HEADERS
     BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${stage_HEADERS})
