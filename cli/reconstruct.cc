@@ -21,6 +21,7 @@ int Run(const Arguments& args, const Common& common) {
   reconstruct::ReconstructOptions options = args.options;
   options.memory_bytes = static_cast<double>(args.memory_bytes);
   options.thread_count = common.thread_count;
+  options.ranks = common.ranks;
   const acquire::SessionReader session(args.session);
   const reconstruct::ReconstructSummary summary =
       reconstruct::Reconstruct(session,

@@ -7,6 +7,7 @@
 #include "core/options_json.h"
 #include "core/parallel.h"
 #include "core/provenance.h"
+#include "core/ranks.h"
 #include "reconstruct/internal/gloss.h"
 #include "reconstruct/internal/group_reader.h"
 #include "reconstruct/internal/group_spool.h"
@@ -19,6 +20,7 @@
 #include <chrono>
 #include <cmath>
 #include <fmt/format.h>
+#include <optional>
 
 namespace nacre::reconstruct {
 namespace {
@@ -140,8 +142,11 @@ std::filesystem::path WorkFile(const std::filesystem::path& out) {
 std::uint64_t KeyOf(const acquire::SessionReader& session,
                     const calibrate::Calibration& calibration,
                     const std::filesystem::path& work,
-                    const calibrate::SpotProfile& spot) {
-  const std::filesystem::path written = work.string() + ".calibration.json";
+                    const calibrate::SpotProfile& spot,
+                    const Ranks* ranks) {
+  // A name of its own for each rank.
+  const std::filesystem::path written = fmt::format(
+      "{}.{}.calibration.json", work.string(), ranks == nullptr ? 0 : ranks->rank());
   calibrate::WriteCalibration(written, calibration);
   const std::string hash = HashFile(written);
   std::filesystem::remove(written);
@@ -163,16 +168,18 @@ void Measure(const GroupReader& reader,
              GroupSpool& spool,
              ReconstructSummary& summary,
              const ProgressFunction& progress) {
-  std::vector<int> wanted;
+  std::vector<int> all;  // that are to be read
   for (int g = 0; g < static_cast<int>(summary.group_count); ++g) {
     if (!reader.IsThere(g)) {
       ++summary.groups_missing;
     } else if (options.incremental && spool.TakeUp(g, reader.StateOf(g))) {
       ++summary.groups_reused;
     } else {
-      wanted.push_back(g);
+      all.push_back(g);
     }
   }
+  const RankShare share = ShareOf(std::ssize(all), options.ranks);
+  const std::vector<int> wanted(all.begin() + share.begin, all.begin() + share.end);
   const int at_once = GroupsAtOnce(reader, options);
   summary.thread_count_used = at_once;
   const auto total = std::ssize(wanted);
@@ -197,7 +204,10 @@ void Measure(const GroupReader& reader,
     });
   }
   Report(progress, {"reconstruct", total, total, "pictures"});
-  for (const int g : wanted) {
+  if (options.ranks != nullptr) {
+    spool.Share(*options.ranks);
+  }
+  for (const int g : all) {
     summary.frame_count += spool.FrameCount(g);
     summary.saturated_count += spool.SaturatedCount(g);
   }
@@ -242,18 +252,22 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   summary.spot_sigma_mm = std::sqrt(std::max(0.0, 0.5 * (spot.xx_mm2 + spot.yy_mm2)));
   summary.group_count = session.schedule().group_count();
   summary.slice_count = header.PointCount();
-  RdWriter writer(out, header);
+  std::optional<RdWriter> writer;
+  if (options.ranks == nullptr || options.ranks->IsRoot()) {
+    writer.emplace(out, header);
+  }
   const GroupReader reader(
       session, calibration, state, header, spot, options.thread_count);
   const std::filesystem::path work = WorkFile(out);
   GroupSpool spool(
       work,
       options.incremental,
-      {.key = KeyOf(session, calibration, work, spot),
+      {.key = KeyOf(session, calibration, work, spot, options.ranks),
        .group_count = summary.group_count,
        .value_count = reader.lattice().CellCount() * std::ssize(header.channels),
        .channel_count = std::ssize(header.channels),
-       .most_spots = static_cast<std::int64_t>(reader.MostSpots())});
+       .most_spots = static_cast<std::int64_t>(reader.MostSpots())},
+      options.ranks);
   Measure(reader, options, spool, summary, progress);
   const bool looks_for_gloss =
       options.remove_gloss && options.specular_radius_cells < 0;
@@ -285,8 +299,12 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
       remover,
       advice,
       *std::max_element(exposures_us.begin(), exposures_us.end())};
-  internal::WriteSlices(separation, finishing, options, writer, summary, progress);
-  writer.Finish();
+  if (!writer) {
+    internal::SendSlices(separation, finishing, options, progress);
+    return summary;
+  }
+  internal::WriteSlices(separation, finishing, options, *writer, summary, progress);
+  writer->Finish();
   RdReader written(out);
   summary.reciprocity = MeasureReciprocity(written);
   summary.seconds =

@@ -12,10 +12,14 @@
 #include <string>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::reconstruct {
 
-/// `incremental`, `memory_bytes`, `max_age_days` and `thread_count` aren't listed in
-/// Visit: they don't change a bit of the result.
+/// `incremental`, `memory_bytes`, `max_age_days`, `thread_count` and `ranks` aren't
+/// listed in Visit: they don't change a bit of the result.
 struct ReconstructOptions {
   bool subtract_crosstalk = true;
   bool sharpen_spot = true;
@@ -27,8 +31,9 @@ struct ReconstructOptions {
   /// Go on from `OUT.work` of an earlier run, take an incomplete session (its missing
   /// slices aren't valid) and leave `OUT.work` behind.
   bool incremental = false;
-  double memory_bytes = 512e6;  ///< for frames under way, at least one is
-  int thread_count = 0;         ///< 0: all cores
+  double memory_bytes = 512e6;   ///< for frames under way, at least one is
+  int thread_count = 0;          ///< 0: all cores
+  const Ranks* ranks = nullptr;  ///< that share the work; null: this process alone
   double max_age_days = calibrate::kMaxAgeDays;  ///< see calibrate::CompareAge
 
   template <class Self, class Visitor>
@@ -85,7 +90,10 @@ struct ReconstructSummary {
 /// A complete session and the calibration of its rig to `*.rd.exr`, group of spots by
 /// group of spots (method and equations: reconstruct/README.md). Throws BadData if the
 /// two aren't of the same rig or pictures are missing (but see `incremental`). The
-/// bytes written don't depend on threads, memory or earlier runs.
+/// bytes written don't depend on threads, ranks, memory or earlier runs. Of several
+/// ranks each merges its share of the pictures into a file beside `out` that all can
+/// see, and finishes its share of the slices; the root writes, and its summary is the
+/// whole one.
 ReconstructSummary Reconstruct(const acquire::SessionReader& session,
                                const calibrate::Calibration& calibration,
                                const std::filesystem::path& out,

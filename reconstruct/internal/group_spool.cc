@@ -2,7 +2,9 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/ranks.h"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
@@ -43,18 +45,6 @@ void WriteAll(int fd, const void* data, std::size_t count, std::int64_t offset) 
   }
 }
 
-int OpenFile(const std::filesystem::path& path, bool is_named) {
-  if (is_named) {
-    return ::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
-  }
-  std::string pattern = (path.parent_path() / ".nacre-groups-XXXXXX").string();
-  const int fd = ::mkostemp(pattern.data(), O_CLOEXEC);
-  if (fd >= 0) {
-    ::unlink(pattern.c_str());
-  }
-  return fd;
-}
-
 }  // namespace
 
 struct GroupSpool::SlotHead {
@@ -66,34 +56,70 @@ struct GroupSpool::SlotHead {
 
 GroupSpool::GroupSpool(const std::filesystem::path& path,
                        bool is_named,
-                       const Shape& shape)
+                       const Shape& shape,
+                       const Ranks* ranks)
     : shape_(shape), held_(static_cast<std::size_t>(shape.group_count), 0) {
-  fd_ = OpenFile(path, is_named);
-  if (fd_ < 0) {
-    throw SystemError("cannot make the work file " + path.string());
-  }
-  const FileHead wanted{.key = shape.key,
-                        .group_count = shape.group_count,
-                        .value_count = shape.value_count,
-                        .ring_count = shape.channel_count * shape.most_spots};
-  FileHead found{};
-  struct stat status {};
+  Open(path, is_named, ranks);
   const std::int64_t size = Offset(static_cast<int>(shape.group_count));
-  const bool goes_on = ::pread(fd_, &found, sizeof found, 0) == sizeof found &&
-                       found == wanted && ::fstat(fd_, &status) == 0 &&
-                       status.st_size == size;
-  if (!goes_on) {
-    if (::ftruncate(fd_, 0) != 0 || ::ftruncate(fd_, size) != 0) {
-      throw SystemError("cannot make the work file " + path.string());
-    }
-    WriteAll(fd_, &wanted, sizeof wanted, 0);
-  }
   void* data =
       ::mmap(nullptr, static_cast<std::size_t>(size), PROT_READ, MAP_SHARED, fd_, 0);
   if (data == MAP_FAILED) {
     throw SystemError("cannot map the work file " + path.string());
   }
   mapped_ = static_cast<const unsigned char*>(data);
+}
+
+// The root makes the file, the others open it by its name, which it then loses unless
+// it is to keep it.
+void GroupSpool::Open(const std::filesystem::path& path,
+                      bool is_named,
+                      const Ranks* ranks) {
+  std::string name = path.string();
+  if (ranks == nullptr || ranks->IsRoot()) {
+    if (is_named) {
+      fd_ = ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+    } else {
+      name = (path.parent_path() / ".nacre-groups-XXXXXX").string();
+      fd_ = ::mkostemp(name.data(), O_CLOEXEC);
+    }
+    if (fd_ >= 0) {
+      Begin(path);
+    }
+  }
+  if (ranks != nullptr) {
+    ranks->Broadcast(name);
+    if (!ranks->IsRoot()) {
+      fd_ = ::open(name.c_str(), O_RDWR | O_CLOEXEC);
+    }
+    ranks->Barrier();
+  }
+  if (!is_named && fd_ >= 0 && (ranks == nullptr || ranks->IsRoot())) {
+    ::unlink(name.c_str());
+  }
+  if (fd_ < 0) {
+    throw SystemError("cannot make the work file " + path.string());
+  }
+}
+
+// Keeps what is there if it is of the same shape and key.
+void GroupSpool::Begin(const std::filesystem::path& path) const {
+  const FileHead wanted{.key = shape_.key,
+                        .group_count = shape_.group_count,
+                        .value_count = shape_.value_count,
+                        .ring_count = shape_.channel_count * shape_.most_spots};
+  FileHead found{};
+  struct stat status {};
+  const std::int64_t size = Offset(static_cast<int>(shape_.group_count));
+  const bool goes_on = ::pread(fd_, &found, sizeof found, 0) == sizeof found &&
+                       found == wanted && ::fstat(fd_, &status) == 0 &&
+                       status.st_size == size;
+  if (goes_on) {
+    return;
+  }
+  if (::ftruncate(fd_, 0) != 0 || ::ftruncate(fd_, size) != 0) {
+    throw SystemError("cannot make the work file " + path.string());
+  }
+  WriteAll(fd_, &wanted, sizeof wanted, 0);
 }
 
 GroupSpool::~GroupSpool() {
@@ -158,6 +184,14 @@ std::int64_t GroupSpool::FrameCount(int g) const {
 
 std::int64_t GroupSpool::SaturatedCount(int g) const {
   return Head(g).saturated_count;
+}
+
+void GroupSpool::Share(const Ranks& ranks) {
+  std::vector<std::int64_t> held(held_.begin(), held_.end());
+  ranks.Sum(held);
+  std::transform(held.begin(), held.end(), held_.begin(), [](std::int64_t ranks_held) {
+    return static_cast<char>(ranks_held > 0);
+  });
 }
 
 bool GroupSpool::TakeUp(int g, std::uint64_t state) {

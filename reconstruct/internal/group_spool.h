@@ -6,6 +6,10 @@
 #include <filesystem>
 #include <span>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::reconstruct::internal {
 
 /// The groups' pictures on the lattice, kept in a file until the slices are cut from
@@ -22,8 +26,11 @@ class GroupSpool {
   };
 
   /// `path`: of the file; `is_named` or else only to be in that folder. A file of
-  /// another key or shape is begun anew.
-  GroupSpool(const std::filesystem::path& path, bool is_named, const Shape& shape);
+  /// another key or shape is begun anew. Collective with `ranks`: one file for all.
+  GroupSpool(const std::filesystem::path& path,
+             bool is_named,
+             const Shape& shape,
+             const Ranks* ranks = nullptr);
   ~GroupSpool();
   GroupSpool(const GroupSpool&) = delete;
   GroupSpool& operator=(const GroupSpool&) = delete;
@@ -32,6 +39,8 @@ class GroupSpool {
   /// state, and whole.
   bool TakeUp(int g, std::uint64_t state);
   void Park(int g, std::uint64_t state, const GroupPicture& picture);
+  /// Collective: what any of the ranks holds is held by all.
+  void Share(const Ranks& ranks);
 
   /// Gives back the memory that pages read so far hold; they stay in the system's
   /// cache.
@@ -50,6 +59,8 @@ class GroupSpool {
  private:
   struct SlotHead;
   const SlotHead& Head(int g) const;
+  void Open(const std::filesystem::path& path, bool is_named, const Ranks* ranks);
+  void Begin(const std::filesystem::path& path) const;
   std::int64_t PayloadBytes() const;
   std::int64_t Offset(int g) const;
 

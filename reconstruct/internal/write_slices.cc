@@ -1,14 +1,18 @@
 #include "reconstruct/internal/write_slices.h"
 
+#include "core/error.h"
 #include "core/parallel.h"
+#include "core/ranks.h"
 #include "reconstruct/internal/fill_diagonal.h"
 #include "reconstruct/internal/glare_floor.h"
 #include "reconstruct/internal/symmetrize.h"
 #include "reconstruct/internal/systematics.h"
 
 #include <algorithm>
+#include <cstring>
 #include <fmt/format.h>
 #include <future>
+#include <type_traits>
 #include <utility>
 
 namespace nacre::reconstruct::internal {
@@ -52,7 +56,81 @@ Finished Finish(const Separation& separation,
   return {std::move(slice), findings};
 }
 
+using Batch = std::vector<Finished>;
+
+constexpr std::int64_t kAtOnce = 64;
+constexpr int kTag = 1;
+
+Batch FinishBatch(const Separation& separation,
+                  const Finishing& finishing,
+                  const ReconstructOptions& options,
+                  std::int64_t first) {
+  Batch batch(static_cast<std::size_t>(
+      std::min(kAtOnce, finishing.header.PointCount() - first)));
+  ParallelFor(std::ssize(batch), options.thread_count, [&](std::int64_t k) {
+    batch[static_cast<std::size_t>(k)] =
+        Finish(separation, finishing, options, first + k);
+  });
+  return batch;
+}
+
+// Batches go to the ranks in turn.
+int OwnerOf(std::int64_t first, const Ranks* ranks) {
+  return ranks == nullptr ? 0 : static_cast<int>(first / kAtOnce % ranks->size());
+}
+
+std::string Pack(const Batch& batch) {
+  static_assert(std::is_trivially_copyable_v<Findings>);
+  std::string bytes;
+  for (const auto& [slice, findings] : batch) {
+    bytes += ToBytes(std::span<const Findings>(&findings, 1));
+    bytes += ToBytes(std::span<const float>(slice.rd));
+    bytes += ToBytes(std::span<const float>(slice.sigma));
+    bytes += ToBytes(std::span<const std::uint8_t>(slice.valid));
+  }
+  return bytes;
+}
+
+template <class T>
+void Take(const char*& from, std::span<T> to) {
+  std::memcpy(to.data(), from, to.size_bytes());
+  from += to.size_bytes();
+}
+
+Batch Unpack(const std::string& bytes, const RdHeader& header) {
+  const auto values = static_cast<std::size_t>(header.SliceSize());
+  const std::size_t each =
+      sizeof(Findings) + values * (2 * sizeof(float) + sizeof(std::uint8_t));
+  Expect(bytes.size() % each == 0, "whole slices from another rank");
+  Batch batch(bytes.size() / each);
+  const char* at = bytes.data();
+  for (auto& [slice, findings] : batch) {
+    slice = MakeSlice(header);
+    Take(at, std::span<Findings>(&findings, 1));
+    Take(at, std::span<float>(slice.rd));
+    Take(at, std::span<float>(slice.sigma));
+    Take(at, std::span<std::uint8_t>(slice.valid));
+  }
+  return batch;
+}
+
 }  // namespace
+
+void SendSlices(const Separation& separation,
+                const Finishing& finishing,
+                const ReconstructOptions& options,
+                const ProgressFunction& progress) {
+  const std::int64_t total = finishing.header.PointCount();
+  for (std::int64_t first = 0; first < total; first += kAtOnce) {
+    if (OwnerOf(first, options.ranks) == options.ranks->rank()) {
+      Report(progress, {"reconstruct", first, total, "slices"});
+      std::string bytes = Pack(FinishBatch(separation, finishing, options, first));
+      options.ranks->Flush();  // no more than one on its way and one being made
+      options.ranks->Post(0, kTag, std::move(bytes));
+    }
+  }
+  options.ranks->Flush();
+}
 
 void WriteSlices(const Separation& separation,
                  const Finishing& finishing,
@@ -60,21 +138,18 @@ void WriteSlices(const Separation& separation,
                  RdWriter& writer,
                  ReconstructSummary& summary,
                  const ProgressFunction& progress) {
-  constexpr std::int64_t kAtOnce = 64;
   const std::int64_t total = finishing.header.PointCount();
   const int width = finishing.header.points_x;
   SymmetrizeChange change;
   ExposureAdvice::Counts dim;
-  std::vector<Finished> written;
+  Batch written;
   std::future<void> writing;  // declared last: it is waited for before `written` goes
   for (std::int64_t first = 0; first < total; first += kAtOnce) {
     Report(progress, {"reconstruct", first, total, "slices"});
-    std::vector<Finished> batch(
-        static_cast<std::size_t>(std::min(kAtOnce, total - first)));
-    ParallelFor(std::ssize(batch), options.thread_count, [&](std::int64_t k) {
-      batch[static_cast<std::size_t>(k)] =
-          Finish(separation, finishing, options, first + k);
-    });
+    const int owner = OwnerOf(first, options.ranks);
+    Batch batch = owner == 0 ? FinishBatch(separation, finishing, options, first)
+                             : Unpack(options.ranks->Receive(kTag, owner).bytes,
+                                      finishing.header);
     for (const auto& [slice, findings] : batch) {
       summary.max_crosstalk = std::max(summary.max_crosstalk, findings.foreign_share);
       summary.invalid_count += findings.invalid;

@@ -5,6 +5,7 @@
 #include "reconstruct/reconstruct.h"
 #include "tests/reconstruct/striped_session.h"
 #include "tests/support/error_message.h"
+#include "tests/support/thread_ranks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -28,6 +29,22 @@ TEST_F(ReconstructTest, BytesDependOnNeitherThreadsNorMemory) {
     options.thread_count = threads;
     options.memory_bytes = 1e9;
     Reconstruct(Session(), shared->calibration, Path("many.rd.exr"), options);
+    EXPECT_TRUE(ReadFile(Path("many.rd.exr")) == ReadFile(Path("one.rd.exr")));
+  }
+}
+
+TEST_F(ReconstructTest, BytesDontDependOnTheNumberOfRanks) {
+  Reconstruct(Session(), shared->calibration, Path("one.rd.exr"), {});
+  for (const int size : {2, 3}) {
+    std::filesystem::remove(Path("many.rd.exr"));
+    nacre::testing::OnThreadRanks(size, [&](const Ranks& ranks) {
+      ReconstructOptions options;
+      options.thread_count = 1;
+      options.ranks = &ranks;
+      const ReconstructSummary summary =
+          Reconstruct(Session(), shared->calibration, Path("many.rd.exr"), options);
+      EXPECT_GT(summary.frame_count, 0);
+    });
     EXPECT_TRUE(ReadFile(Path("many.rd.exr")) == ReadFile(Path("one.rd.exr")));
   }
 }
