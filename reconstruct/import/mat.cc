@@ -1,6 +1,7 @@
 #include "reconstruct/import/mat.h"
 
 #include "core/error.h"
+#include "reconstruct/internal/mat_elements.h"
 
 #include <bit>
 #include <fmt/format.h>
@@ -50,31 +51,6 @@ std::int64_t SizeOf(NumberType type) {
   return kSizes[static_cast<std::size_t>(type)];
 }
 
-// Version 5 is a row of elements, each with its length: they must fill the file.
-// libmatio reads zeros where numbers are missing.
-void CheckElements(std::ifstream& file, bool big_endian, const std::string& origin) {
-  file.seekg(0, std::ios::end);
-  const std::int64_t size = file.tellg();
-  std::int64_t at = 128;
-  while (at < size) {
-    std::array<char, 8> tag{};
-    file.seekg(at);
-    file.read(tag.data(), tag.size());
-    std::uint32_t bytes = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      bytes |= std::uint32_t{static_cast<unsigned char>(tag[4 + k])}
-               << (8 * (big_endian ? 3 - k : k));
-    }
-    if (!file || at + 8 + std::int64_t{bytes} > size) {
-      break;
-    }
-    at += 8 + std::int64_t{bytes};
-  }
-  if (at != size || size == 128) {
-    throw BadData(origin + ": truncated or damaged: the lengths in it don't add up");
-  }
-}
-
 // libmatio guesses at the kind of anything; only what begins like one of the versions
 // and is as long as it says is given to it.
 void CheckWhole(const std::filesystem::path& path) {
@@ -97,7 +73,7 @@ void CheckWhole(const std::filesystem::path& path) {
   file.read(beyond.data(), beyond.size());
   if (std::string_view(beyond.data(), beyond.size()) != kHdf5) {
     file.clear();
-    CheckElements(file, text.ends_with("MI"), path.string());
+    CheckMatElements(file, text.ends_with("MI"), path.string());
   }
 }
 

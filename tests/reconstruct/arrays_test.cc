@@ -266,6 +266,62 @@ TEST(Mat, TheVariableIsAskedFor) {
   EXPECT_THAT(message({}), HasSubstr("isn't a MATLAB file"));
 }
 
+// A scan beside a structure of a text and of cells, as laboratories keep them.
+void WriteMatWithNotes(const std::filesystem::path& path, matio_compression packed) {
+  WriteMat(path, MAT_FT_MAT5, packed != MAT_COMPRESSION_NONE, 1);
+  std::array<const char*, 2> fields = {"sample", "filters"};
+  std::array<std::size_t, 2> one = {1, 1};
+  std::array<std::size_t, 2> three = {1, 3};
+  matvar_t* notes = Mat_VarCreateStruct("notes", 2, one.data(), fields.data(), 2);
+  std::string text = "wax";
+  Mat_VarSetStructFieldByName(
+      notes,
+      "sample",
+      0,
+      Mat_VarCreate(nullptr, MAT_C_CHAR, MAT_T_UINT8, 2, three.data(), text.data(), 0));
+  std::array<matvar_t*, 3> cells = {};
+  for (matvar_t*& cell : cells) {
+    double value = 0.5;
+    cell = Mat_VarCreate(nullptr, MAT_C_DOUBLE, MAT_T_DOUBLE, 2, one.data(), &value, 0);
+  }
+  Mat_VarSetStructFieldByName(
+      notes,
+      "filters",
+      0,
+      Mat_VarCreate(nullptr, MAT_C_CELL, MAT_T_CELL, 2, three.data(), cells.data(), 0));
+  mat_t* file = Mat_Open(path.c_str(), MAT_ACC_RDWR);
+  ASSERT_NE(file, nullptr);
+  Mat_VarWrite(file, notes, packed);
+  Mat_VarFree(notes);
+  Mat_Close(file);
+}
+
+TEST(Mat, WhatLiesBesideTheScanMayBeOfAnyKindButMustFit) {
+  const TempFolder folder;
+  for (const matio_compression packed : {MAT_COMPRESSION_NONE, MAT_COMPRESSION_ZLIB}) {
+    WriteMatWithNotes(folder / "a.mat", packed);
+    ImportMat(folder / "a.mat", folder / "a.rd.exr", {.pitch_mm = 0.5}, {});
+    ExpectValues(ReadDataset(folder / "a.rd.exr"));
+  }
+  WriteMatWithNotes(folder / "a.mat", MAT_COMPRESSION_NONE);
+  std::string bytes = ReadFile(folder / "a.mat");
+  const std::string three("\5\0\0\0\x8\0\0\0\1\0\0\0\3\0\0\0", 16);
+  std::size_t changed = 0;
+  for (std::size_t at = bytes.find(three); at != std::string::npos;
+       at = bytes.find(three, at + 1)) {
+    bytes[at + 15] = 0x10;  // 2^28 more letters, or cells
+    ++changed;
+    WriteFile(folder / "a.mat", bytes);
+    EXPECT_THAT(ErrorMessage([&] {
+                  ImportMat(
+                      folder / "a.mat", folder / "a.rd.exr", {.pitch_mm = 0.5}, {});
+                }),
+                HasSubstr("the lengths in it don't add up"));
+    bytes[at + 15] = 0;
+  }
+  EXPECT_EQ(changed, 2U);
+}
+
 TEST(Mat, TruncatedAndHostileFilesAreRefused) {
   const TempFolder folder;
   for (const bool packed : {false, true}) {
