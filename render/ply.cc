@@ -143,7 +143,7 @@ int PropertyIndex(const PlyElement& element, std::initializer_list<const char*> 
 
 float ToFloat(double value) {
   // What a float can't hold becomes infinite, which CheckMesh names.
-  constexpr double kMax = std::numeric_limits<float>::max();
+  constexpr double kMax = static_cast<double>(std::numeric_limits<float>::max());
   return std::abs(value) <= kMax ? static_cast<float>(value)
                                  : std::numeric_limits<float>::infinity();
 }
