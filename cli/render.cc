@@ -224,11 +224,16 @@ int Run(Arguments& arguments, const Common& common) {
   }
   save(parts);
   show(parts.front());
+  const render::Invariants& invariants = rendering.summary.invariants;
+  for (const std::string& warning : invariants.Warnings()) {
+    Say(common, "warning: " + warning);
+  }
   Json json = rendering.summary.ToJson();
   json["out"] = arguments.out.string();
   Print(common,
         json,
-        arguments.stats ? rendering.summary.Table() : rendering.summary.Brief());
+        (arguments.stats ? rendering.summary.Table() : rendering.summary.Brief()) +
+            "\n" + invariants.Brief());
   return 0;
 }
 

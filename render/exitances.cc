@@ -77,7 +77,7 @@ Exitances::Exitances(const World& world,
       owned_[i] = std::make_unique<ReferenceExitance>(
           world, i, indirect_, settings.kind == IntegratorSettings::Kind::kPath);
     } else {
-      Illuminate(i, options, summary);
+      Illuminate(i, options, total, summary);
     }
     sources_[i] = owned_[i].get();
   }
@@ -102,6 +102,7 @@ void Exitances::FindSeen(const RenderOptions& options) {
 
 void Exitances::Illuminate(std::uint32_t shape,
                            const RenderOptions& options,
+                           std::int64_t shape_count,
                            RenderSummary& summary) {
   const Shape& lit_shape = world_.scene().shapes[shape];
   const Stopwatch irradiance_time;
@@ -123,9 +124,17 @@ void Exitances::Illuminate(std::uint32_t shape,
   summary.shadow_rays += points.counters.shadow_rays;
   const Stopwatch model_time;
   const SubsurfaceModel& model = *lit_shape.translucency->model;
+  const bool is_weighed = !points.capped;  // too few points show too much near each
+  if (is_weighed) {
+    energy_.Enter(lit_shape.translucency->name, points.points, shape_count);
+  }
+  auto subsurface = model.Illuminate(std::move(points.points), options.thread_count);
+  if (is_weighed) {
+    energy_.SetModel(*subsurface);
+  }
   owned_[shape] = std::make_unique<ExitanceField>(
       lit_shape,
-      model.Illuminate(std::move(points.points), options.thread_count),
+      std::move(subsurface),
       static_cast<float>(options.exitance_spacing) * model.ExitanceSpacingMm(),
       model.PatchSizeMm());
   summary.models_s += model_time.Seconds();

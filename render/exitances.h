@@ -1,6 +1,7 @@
 #pragma once
 
 #include "render/integrators/path.h"
+#include "render/invariants.h"
 #include "render/render.h"
 #include "render/seen_places.h"
 #include "render/world.h"
@@ -28,10 +29,16 @@ class Exitances {
   /// What has been used of all models.
   void AddUse(ModelUse& use) const;
 
+  /// Light in and out of each shape that has the lit points its model asks for.
+  std::vector<ObjectEnergy> Energies(int thread_count) const {
+    return energy_.Measure(thread_count);
+  }
+
  private:
   void FindSeen(const RenderOptions& options);
   void Illuminate(std::uint32_t shape,
                   const RenderOptions& options,
+                  std::int64_t shape_count,
                   RenderSummary& summary);
 
   const World& world_;
@@ -41,6 +48,7 @@ class Exitances {
   std::vector<std::unique_ptr<SeenPlaces>> seen_;
   std::vector<std::unique_ptr<const ExitanceSource>> owned_;
   ExitanceSources sources_;
+  EnergyCheck energy_;
 };
 
 }  // namespace nacre::render

@@ -324,9 +324,11 @@ Rendering Render(const Scene& scene,
   }
   DescribeSamples(film, summary);
   summary.paths_s = schedule.Seconds();
-  exitances.AddUse(summary.use);
-  summary.cpu_s = cpu.Seconds();
+  exitances.AddUse(summary.use);  // by the picture, before the check asks for more
   rendering.image = film.ToImage();
+  CheckPixels(rendering.image, scene.film, summary.invariants);
+  summary.invariants.objects = exitances.Energies(options.thread_count);
+  summary.cpu_s = cpu.Seconds();
   if (options.aovs) {
     rendering.aovs = film.ToAovs();
   }

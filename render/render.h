@@ -6,6 +6,7 @@
 #include "core/options.h"
 #include "core/progress.h"
 #include "render/checkpoint.h"
+#include "render/invariants.h"
 #include "render/scene.h"
 
 #include <cstdint>
@@ -117,6 +118,7 @@ struct RenderSummary {
   ModelUse use;                  ///< of measured materials, all together
   std::int64_t bad_samples = 0;  ///< NaN or infinite: left out
   std::int64_t clamped_samples = 0;
+  Invariants invariants;    ///< checked at the end
   double build_s = 0;       ///< the ray tracer's tree
   double seen_s = 0;        ///< finding what the camera sees
   double irradiance_s = 0;  ///< light entering translucent objects

@@ -118,6 +118,7 @@ Json RenderSummary::ToJson() const {
           {"terms_total", use.terms_total},
           {"bad_samples", bad_samples},
           {"clamped_samples", clamped_samples},
+          {"invariants", invariants.ToJson()},
           {"seconds",
            {{"build", build_s},
             {"seen", seen_s},

@@ -2,7 +2,9 @@
 
 #include "render/warp.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace nacre::render {
 namespace {
@@ -139,8 +141,12 @@ World::World(const Scene& scene, int thread_count)
     const float area = static_cast<float>(source.emitter->area());
     AddSource(std::move(source), *shape.radiance * (kPi * area), shape.sampling_weight);
   }
+  // A power beyond all floats is the largest: infinities have no shares.
+  const float most = std::numeric_limits<float>::max() /
+                     static_cast<float>(std::max<std::size_t>(1, sources_.size()));
   float total = 0;
-  for (const Source& source : sources_) {
+  for (Source& source : sources_) {
+    source.probability = std::min(source.probability, most);
     total += source.probability;
   }
   float cumulative = 0;
