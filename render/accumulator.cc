@@ -56,6 +56,14 @@ Accumulator::Luminance Accumulator::LuminanceOf(std::size_t pixel) const {
   return luminance;
 }
 
+std::int64_t Accumulator::SamplesMade() const {
+  std::int64_t sum = 0;
+  for (std::size_t pixel = 0; pixel < sums_.size(); ++pixel) {
+    sum += SamplesMade(pixel);
+  }
+  return sum;
+}
+
 double Accumulator::RelativeError() const {
   double variances = 0;
   double squares = 0;
@@ -133,6 +141,27 @@ bool Accumulator::Restore(std::string_view bytes) {
     return false;
   }
   std::memcpy(sums_.data(), bytes.data(), bytes.size());
+  return true;
+}
+
+std::string Accumulator::Bytes(const PixelBlock& block) const {
+  std::string bytes;
+  for (int y = block.y0; y < block.y1; ++y) {
+    bytes.append(reinterpret_cast<const char*>(&sums_[RowStart(block, y)]),
+                 BytesInRow(block));
+  }
+  return bytes;
+}
+
+bool Accumulator::Restore(const PixelBlock& block, std::string_view bytes) {
+  const std::size_t row = BytesInRow(block);
+  if (bytes.size() != static_cast<std::size_t>(block.y1 - block.y0) * row) {
+    return false;
+  }
+  for (int y = block.y0; y < block.y1; ++y) {
+    std::memcpy(&sums_[RowStart(block, y)], bytes.data(), row);
+    bytes.remove_prefix(row);
+  }
   return true;
 }
 

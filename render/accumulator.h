@@ -10,6 +10,14 @@
 
 namespace nacre::render {
 
+/// Pixels of a crop window, up to before (x1, y1).
+struct PixelBlock {
+  int x0 = 0;
+  int y0 = 0;
+  int x1 = 0;
+  int y1 = 0;
+};
+
 /// Sums of samples, a pixel of the crop window. Pixels may have different numbers of
 /// them.
 class Accumulator {
@@ -32,6 +40,8 @@ class Accumulator {
     return sums_[pixel].samples + sums_[pixel].left_out;
   }
 
+  std::int64_t SamplesMade() const;  ///< of all pixels together
+
   /// The relative L2 error of the luminance: the root of the variances of the pixels'
   /// means, summed, over that of their summed squares. Infinite while a pixel has less
   /// than two samples, 0 for a black picture.
@@ -49,6 +59,9 @@ class Accumulator {
   /// another size of film.
   std::string Bytes() const;
   bool Restore(std::string_view bytes);
+  /// The same of some of its pixels.
+  std::string Bytes(const PixelBlock& block) const;
+  bool Restore(const PixelBlock& block, std::string_view bytes);
 
  private:
   struct Sums {
@@ -60,6 +73,14 @@ class Accumulator {
     std::int64_t samples = 0;
     std::int64_t left_out = 0;
   };
+  std::size_t RowStart(const PixelBlock& block, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(film_.crop_width) +
+           static_cast<std::size_t>(block.x0);
+  }
+  static std::size_t BytesInRow(const PixelBlock& block) {
+    return static_cast<std::size_t>(block.x1 - block.x0) * sizeof(Sums);
+  }
+
   Film film_;
   std::vector<Sums> sums_;
 };

@@ -4,26 +4,58 @@
 #include "core/error.h"
 #include "core/hash.h"
 
+#include <cstdint>
+#include <cstring>
+
 namespace nacre::render {
 namespace {
 
-constexpr std::string_view kMagic = "nacre checkpoint 1\n";
+constexpr std::string_view kMagic = "nacre checkpoint 2\n";
 
 std::string HashOf(std::string_view bytes) {
   return HashHex(bytes.data(), bytes.size());
 }
 
+std::string BytesOf(const std::vector<int>& pass) {
+  const std::uint64_t count = pass.size();
+  std::string bytes(reinterpret_cast<const char*>(&count), sizeof(count));
+  bytes.append(reinterpret_cast<const char*>(pass.data()), count * sizeof(int));
+  return bytes;
+}
+
+// False if the bytes don't begin with what BytesOf() makes.
+bool TakePass(std::string_view& bytes, std::vector<int>& pass) {
+  std::uint64_t count = 0;
+  if (bytes.size() < sizeof(count)) {
+    return false;
+  }
+  std::memcpy(&count, bytes.data(), sizeof(count));
+  bytes.remove_prefix(sizeof(count));
+  if (count > bytes.size() / sizeof(int)) {
+    return false;
+  }
+  pass.resize(count);
+  std::memcpy(pass.data(), bytes.data(), count * sizeof(int));
+  bytes.remove_prefix(count * sizeof(int));
+  return true;
+}
+
 }  // namespace
 
-void WriteCheckpoint(const Checkpoint& checkpoint, const Accumulator& film) {
+void WriteCheckpoint(const Checkpoint& checkpoint,
+                     const Accumulator& film,
+                     const std::vector<int>& pass) {
   std::string bytes(kMagic);
   bytes += HashOf(checkpoint.identity);
+  bytes += BytesOf(pass);
   bytes += film.Bytes();
   bytes += HashOf(bytes);
   WriteFile(checkpoint.path, bytes);
 }
 
-bool ReadCheckpoint(const Checkpoint& checkpoint, Accumulator& film) {
+bool ReadCheckpoint(const Checkpoint& checkpoint,
+                    Accumulator& film,
+                    std::vector<int>& pass) {
   if (!std::filesystem::exists(checkpoint.path)) {
     return false;
   }
@@ -45,8 +77,8 @@ bool ReadCheckpoint(const Checkpoint& checkpoint, Accumulator& film) {
   if (bytes.substr(kMagic.size(), identity.size()) != identity) {
     refuse("it is of another scene, seed, integrator or options");
   }
-  const std::size_t header = kMagic.size() + identity.size();
-  if (!film.Restore(bytes.substr(header, bytes.size() - around))) {
+  bytes = bytes.substr(kMagic.size() + identity.size(), bytes.size() - around);
+  if (!TakePass(bytes, pass) || !film.Restore(bytes)) {
     refuse("it is of a picture of another size");
   }
   return true;

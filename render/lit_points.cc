@@ -1,12 +1,16 @@
 #include "render/lit_points.h"
 
 #include "core/parallel.h"
+#include "core/ranks.h"
 #include "render/entering_light.h"
 #include "render/warp.h"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <span>
+#include <string>
 
 namespace nacre::render {
 namespace {
@@ -138,6 +142,59 @@ class Placement {
   std::vector<Place> places_;
 };
 
+struct Sharing {
+  std::int64_t count;
+  int thread_count;
+  const Ranks* ranks;
+};
+
+// The light of each point, block by block of them on threads and ranks: every n-th
+// block is this rank's, and all ranks get all.
+void LightByBlocks(
+    const Sharing& sharing,
+    const std::function<Color(std::int64_t point, PathCounters& counters)>& light,
+    LitPoints& result) {
+  const int size = sharing.ranks == nullptr ? 1 : sharing.ranks->size();
+  const int rank = sharing.ranks == nullptr ? 0 : sharing.ranks->rank();
+  const std::int64_t blocks = (sharing.count + kBlock - 1) / kBlock;
+  // Calls use(point) for all points of a rank's block number k.
+  const auto for_block = [&](int of, std::int64_t k, const auto& use) {
+    const std::int64_t begin = (k * size + of) * kBlock;
+    for (std::int64_t i = begin; i < std::min(begin + kBlock, sharing.count); ++i) {
+      use(i, result.points[static_cast<std::size_t>(i)].flux_density);
+    }
+  };
+  const auto blocks_of = [&](int of) { return (blocks - of + size - 1) / size; };
+  std::vector<PathCounters> counters(static_cast<std::size_t>(blocks_of(rank)));
+  ParallelFor(blocks_of(rank), sharing.thread_count, [&](std::int64_t k) {
+    PathCounters& of_block = counters[static_cast<std::size_t>(k)];
+    for_block(rank, k, [&](std::int64_t i, Color& flux) { flux = light(i, of_block); });
+  });
+  for (const PathCounters& of_block : counters) {
+    result.counters += of_block;
+  }
+  if (size == 1) {
+    return;
+  }
+  std::vector<Color> mine;
+  for (std::int64_t k = 0; k < blocks_of(rank); ++k) {
+    for_block(rank, k, [&](std::int64_t, Color& flux) { mine.push_back(flux); });
+  }
+  const std::vector<std::string> all =
+      sharing.ranks->AllGather(ToBytes(std::span<const Color>(mine)));
+  for (int of = 0; of < size; ++of) {
+    const auto theirs = FromBytes<Color>(all[static_cast<std::size_t>(of)]);
+    std::size_t next = 0;
+    for (std::int64_t k = 0; k < blocks_of(of); ++k) {
+      for_block(of, k, [&](std::int64_t, Color& flux) { flux = theirs.at(next++); });
+    }
+  }
+  std::int64_t rays[] = {result.counters.rays, result.counters.shadow_rays};
+  sharing.ranks->Sum(rays);
+  result.counters.rays = rays[0];
+  result.counters.shadow_rays = rays[1];
+}
+
 }  // namespace
 
 LitPoints SampleLitPoints(const World& world,
@@ -178,31 +235,30 @@ LitPoints SampleLitPoints(const World& world,
                                             std::max(1.0, options.points_per_patch))));
   const std::uint64_t seed = MixSeed(options.seed, shape_index);
   result.points.resize(places.size());
-  std::vector<PathCounters> counters(
-      static_cast<std::size_t>((place_count + kBlock - 1) / kBlock));
   ParallelForBlocks(
       place_count,
       kBlock,
       options.thread_count,
       [&](std::int64_t begin, std::int64_t end) {
-        PathCounters& block = counters[static_cast<std::size_t>(begin / kBlock)];
         for (std::int64_t i = begin; i < end; ++i) {
           const Place& place = places[static_cast<std::size_t>(i)];
-          const SurfaceHit hit = PlacePoint(shape, place.triangle, place.index);
           LitPoint& lit = result.points[static_cast<std::size_t>(i)];
-          lit.point = ToSurfacePoint(hit, translucency.mm_per_unit);
+          lit.point = ToSurfacePoint(PlacePoint(shape, place.triangle, place.index),
+                                     translucency.mm_per_unit);
           lit.area_mm2 =
               static_cast<float>(area_mm2 / parts * static_cast<double>(place.parts));
-          lit.flux_density =
-              light.AllLights(hit,
-                              samples << place.level,
-                              MixSeed(seed, static_cast<std::uint64_t>(i)),
-                              block);
         }
       });
-  for (const PathCounters& block : counters) {
-    result.counters += block;
-  }
+  LightByBlocks(
+      {place_count, options.thread_count, options.ranks},
+      [&](std::int64_t i, PathCounters& counters) {
+        const Place& place = places[static_cast<std::size_t>(i)];
+        return light.AllLights(PlacePoint(shape, place.triangle, place.index),
+                               samples << place.level,
+                               MixSeed(seed, static_cast<std::uint64_t>(i)),
+                               counters);
+      },
+      result);
   return result;
 }
 

@@ -8,6 +8,10 @@
 #include <cstdint>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::render {
 
 struct LitPointOptions {
@@ -15,7 +19,8 @@ struct LitPointOptions {
   std::int64_t max_points = 2'000'000;  ///< an object
   std::uint64_t seed = 1;
   int thread_count = 0;
-  bool indirect = true;  ///< if the shape wants it too
+  const Ranks* ranks = nullptr;  ///< share the points' light; null: nobody does
+  bool indirect = true;          ///< if the shape wants it too
   /// What the picture looks at; far from there, points are fewer. Null: all of it.
   const SeenPlaces* seen = nullptr;
 };

@@ -1,6 +1,7 @@
 // Samples that are kept, added to and counted.
 
 #include "core/atomic_file.h"
+#include "core/error.h"
 #include "render/sample_plan.h"
 #include "tests/render/scene_text.h"
 #include "tests/support/temp_folder.h"
@@ -165,20 +166,54 @@ TEST(CheckpointTest, WorkInTwoPartsGivesTheSameBits) {
   }
 }
 
+// A pass that was stopped anywhere in it is ended as it was planned.
+TEST(CheckpointTest, WorkThatIsStoppedGoesOnToTheSameBits) {
+  const nacre::testing::TempFolder folder;
+  const Checkpoint checkpoint{folder.path() / "half", "scene a"};
+  const Scene scene = HalfNoisy();
+  for (const char* sampling : {"even", "adaptive"}) {
+    RenderOptions options = Spp(24);
+    options.sampling = sampling;
+    const Rendering once = Render(scene, options);
+    std::filesystem::remove(checkpoint.path);
+    int stops = 0;
+    for (bool is_done = false; !is_done;) {
+      int tiles = 0;
+      try {
+        const Rendering resumed = Render(
+            scene,
+            options,
+            [&](const Progress& p) { return p.stage != "render" || ++tiles < 21; },
+            {},
+            checkpoint);
+        EXPECT_EQ(resumed.image.values, once.image.values) << sampling;
+        is_done = true;
+      } catch (const Error& e) {
+        ASSERT_EQ(e.code(), ExitCode::kInterrupted);
+        EXPECT_THAT(e.what(), HasSubstr("the same command goes on"));
+        ++stops;
+      }
+    }
+    EXPECT_GT(stops, 3);
+  }
+}
+
 TEST(CheckpointTest, WhatDoesNotFitIsRefused) {
   const nacre::testing::TempFolder folder;
   const Checkpoint checkpoint{folder.path() / "half", "scene a"};
   const Film film{.width = 4, .height = 4, .crop_width = 4, .crop_height = 4};
   Accumulator sums(film);
-  EXPECT_FALSE(ReadCheckpoint(checkpoint, sums));
+  std::vector<int> pass;
+  EXPECT_FALSE(ReadCheckpoint(checkpoint, sums, pass));
   sums.Add(3, {1, 2, 3}, 1, 1);
-  WriteCheckpoint(checkpoint, sums);
+  WriteCheckpoint(checkpoint, sums, {7});
   Accumulator same(film);
-  EXPECT_TRUE(ReadCheckpoint(checkpoint, same));
+  EXPECT_TRUE(ReadCheckpoint(checkpoint, same, pass));
   EXPECT_EQ(same.Bytes(), sums.Bytes());
+  EXPECT_EQ(pass, std::vector<int>{7});
   const auto message = [&](const Checkpoint& of, Accumulator into) {
     try {
-      ReadCheckpoint(of, into);
+      ReadCheckpoint(of, into, pass);
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ExitCode::kBadData);
       return std::string(e.what());
