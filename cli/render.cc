@@ -174,6 +174,7 @@ int Run(Arguments& arguments, const Common& common) {
   }
   options.seed = common.seed;
   options.thread_count = common.thread_count;
+  options.ranks = common.ranks;
   if (arguments.denoise) {
     render::RequireDenoiser();
   }
@@ -195,7 +196,7 @@ int Run(Arguments& arguments, const Common& common) {
   };
   std::optional<render::TevDisplay> display;
   const bool saves = options.snapshot_s > 0;
-  if (!arguments.tev.empty()) {
+  if (!arguments.tev.empty() && common.IsRoot()) {
     display.emplace(arguments.tev);
     constexpr double kShowEvery = 2;
     options.snapshot_s = saves ? options.snapshot_s : kShowEvery;
@@ -217,6 +218,12 @@ int Run(Arguments& arguments, const Common& common) {
                        }
                      },
                      {arguments.checkpoint, IdentityOf(provenance)});
+  if (!common.IsRoot()) {
+    return 0;
+  }
+  for (const std::string& lost : rendering.summary.ranks_lost) {
+    Say(common, "warning: " + lost + " (its tiles were rendered by others)");
+  }
   std::vector<ExrPart> parts = rendering.aovs;
   parts.insert(parts.begin(), rendering.image);
   if (arguments.denoise) {
