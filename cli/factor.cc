@@ -44,6 +44,7 @@ std::string Text(const factor::FactorSummary& summary,
       100 * summary.worst_slice,
       summary.worst_total,
       summary.passes);
+  text += "\n  " + summary.invariants.Brief();
   return text;
 }
 

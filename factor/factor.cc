@@ -193,6 +193,11 @@ Factorization FactorSource(SliceSource& source,
   summary.working_bytes = working_bytes;
   summary.passes = job.passes;
   AddNotes(options, source.header().PointCount(), method->MostTerms(), summary);
+  summary.invariants =
+      CheckInvariants(result.material, options.seed, options.thread_count);
+  if (const std::string note = summary.invariants.EnergyNote(); !note.empty()) {
+    summary.notes.push_back(note);
+  }
   summary.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
   summary.seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -3,6 +3,7 @@
 #include "core/json_fwd.h"
 #include "core/options.h"
 #include "core/progress.h"
+#include "factor/invariants.h"
 #include "factor/material.h"
 #include "reconstruct/rd_dataset.h"
 
@@ -165,6 +166,7 @@ struct FactorSummary {
   std::int64_t working_bytes = 0;  ///< estimated, beside dataset and material
   double cpu_seconds = 0;          ///< of the whole process while factoring
   double seconds = 0;
+  Invariants invariants;           ///< of the material, checked at the end
   std::vector<std::string> notes;  ///< what a person should know
 
   std::string Brief() const;  ///< one line
@@ -184,7 +186,8 @@ struct Factorization {
 /// the thread count.
 ///
 /// Throws a usage Error for an unknown method or an option out of range; BadData naming
-/// slice, channel and cell for a value that isn't finite; Interrupted.
+/// slice, channel and cell for a value that isn't finite, of the data or of the model;
+/// Interrupted.
 Factorization Factor(const reconstruct::RdDataset& dataset,
                      const FactorOptions& options,
                      const ProgressFunction& progress = {});

@@ -54,6 +54,7 @@ Json FactorSummary::ToJson() const {
           {"search_steps", search_steps},
           {"working_bytes", working_bytes},
           {"error_curve", curve},
+          {"invariants", invariants.ToJson()},
           {"notes", notes}};
 }
 

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -213,6 +214,67 @@ INSTANTIATE_TEST_SUITE_P(Methods,
                            std::erase(name, '-');
                            return name;
                          });
+
+// What has to hold of every material is looked at when it is made.
+TEST_P(FactorStress, InvariantsAreMeasured) {
+  const auto [m, summary] = Factor(
+      MakeChessboard({.points_x = 12, .points_y = 12, .core = 7}), Options(TermsOf(6)));
+  const Invariants& found = summary.invariants;
+  EXPECT_EQ(found.slices, 64);
+  EXPECT_GE(found.least, 0);
+  EXPECT_GT(found.largest, 0);
+  EXPECT_GT(found.pairs, 1000);
+  if (IsReciprocal()) {
+    EXPECT_EQ(found.asymmetry, 0) << "the same bits both ways";
+  }
+  EXPECT_LT(found.asymmetry, 0.5);
+  const float largest = *std::max_element(m.albedo.begin(), m.albedo.end());
+  EXPECT_EQ(found.largest_total, static_cast<double>(largest));
+}
+
+TEST(FactorInvariants, MoreLightOutThanInIsSaid) {
+  // 25 cells of 10 mm⁻² are far above 1, whatever the pitch of the synthetic grid.
+  RdDataset bright = MakeConstant(4, 3, 5, 10);
+  bright.header.pitch_mm = 1;
+  const auto summary = Factor(bright, {.terms = 1}).summary;
+  EXPECT_EQ(summary.invariants.above_one, 12);
+  EXPECT_NEAR(summary.invariants.largest_total, 250, 0.5);
+  EXPECT_THAT(summary.notes, Contains(HasSubstr("12 totals of slices are above 1")));
+  RdDataset white = MakeConstant(4, 3, 5, 0.04F);
+  white.header.pitch_mm = 1;
+  EXPECT_EQ(Factor(white, {.terms = 1}).summary.invariants.above_one, 0);
+}
+
+// Columns of 1 and 3 by turns, whatever x_o: pairs an odd way apart differ by their
+// mean, the others not at all.
+TEST(FactorInvariants, AsymmetryIsThatOfThePairs) {
+  RdDataset dataset = MakeConstant(16, 16, 5, 1);
+  for (std::size_t n = 0; n < dataset.rd.size(); ++n) {
+    dataset.rd[n] = n / 25 % 2 == 0 ? 1.0F : 3.0F;
+  }
+  const Material m = Factor(dataset, {.method = "svd", .terms = 2}).material;
+  const Invariants found = CheckInvariants(m);
+  // Of the 24 ways 10 are odd.
+  EXPECT_NEAR(found.asymmetry, std::sqrt(10.0 / 24), 0.03);
+  EXPECT_EQ(CheckInvariants(m, 1, 3).asymmetry, found.asymmetry);
+  EXPECT_NE(CheckInvariants(m, 2).asymmetry, found.asymmetry);
+}
+
+TEST(FactorInvariants, WhatIsNotFiniteIsRefusedAndNamed) {
+  Material m = Factor(MakeConstant(2, 1, 3, 1), {.method = "svd", .bits = 32}).material;
+  m.row_scale.assign(m.row_scale.size(), std::numeric_limits<float>::max());
+  m.h.assign(m.h.size(), std::numeric_limits<float>::max());
+  m.f.assign(m.f.size(), 1);
+  try {
+    CheckInvariants(m);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadData);
+    EXPECT_THAT(
+        e.what(),
+        AllOf(HasSubstr("R_d = inf at slice (0, 0)"), HasSubstr("cell (0, 0)")));
+  }
+}
 
 TEST(FactorStress, SizesThatDoNotFitTheHeaderAreRefused) {
   RdDataset dataset = MakeConstant(3, 3, 3, 1);
