@@ -4,9 +4,15 @@
 
 #include "cli/command_line.h"
 #include "core/json.h"
+#include "core/options_json.h"
+#include "core/ranks.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
+#include <type_traits>
 
 namespace nacre::cli {
 namespace {
@@ -14,6 +20,7 @@ namespace {
 struct Arguments {
   std::filesystem::path dataset;
   std::filesystem::path out;
+  std::filesystem::path reuse;
   factor::FactorOptions options;
 };
 
@@ -48,12 +55,62 @@ std::string Text(const factor::FactorSummary& summary,
   return text;
 }
 
-int Run(Arguments& arguments, const Common& common) {
-  arguments.options.thread_count = common.thread_count;
-  arguments.options.seed = common.seed;
+// The options of a material but for those that are given.
+factor::FactorOptions Changed(const factor::Material& made,
+                              const factor::FactorOptions& parsed,
+                              const CLI::App& app) {
+  factor::FactorOptions options = factor::OptionsOf(made);
+  const Json given = OptionsToJson(parsed);
+  factor::FactorOptions::Visit(
+      options, [&](const char* name, auto& value, Range, const char*) {
+        std::string flag = std::string("--") + name;
+        std::replace(flag.begin(), flag.end(), '_', '-');
+        if (app.count(flag) > 0) {
+          value = given[name].get<std::remove_cvref_t<decltype(value)>>();
+        }
+      });
+  return options;
+}
+
+// What is to be done, and with what to begin.
+struct Plan {
+  factor::FactorOptions options;
+  std::optional<factor::Material> made;
+};
+
+Plan MakePlan(const CLI::App& app, const Arguments& arguments, const Common& common) {
+  Plan plan{arguments.options, {}};
+  plan.options.seed = common.seed;
+  if (!arguments.reuse.empty()) {
+    plan.made = factor::ReadMaterial(arguments.reuse);
+    plan.options = Changed(*plan.made, plan.options, app);
+  }
+  plan.options.thread_count = common.thread_count;
+  if (common.ranks != nullptr && common.ranks->size() > 1) {
+    if (factor::SharesWork(plan.options.method)) {
+      plan.options.ranks = common.ranks;
+    } else {
+      Say(common,
+          fmt::format("note: method {} works on one rank alone, the others wait",
+                      plan.options.method));
+    }
+  }
+  return plan;
+}
+
+int Run(const CLI::App& app, const Arguments& arguments, const Common& common) {
+  const Plan plan = MakePlan(app, arguments, common);
+  if (plan.options.ranks == nullptr && !common.IsRoot()) {
+    return 0;
+  }
   reconstruct::RdReader reader(arguments.dataset);
+  const ProgressFunction progress = ConsoleProgress(common);
   const auto [material, summary] =
-      factor::Factor(reader, arguments.options, ConsoleProgress(common));
+      plan.made ? factor::FactorAgain(*plan.made, reader, plan.options, progress)
+                : factor::Factor(reader, plan.options, progress);
+  if (!common.IsRoot()) {
+    return 0;
+  }
   factor::WriteMaterial(arguments.out, material);
   for (const std::string& note : summary.notes) {
     Say(common, "note: " + note);
@@ -72,9 +129,14 @@ std::function<int()> MakeFactorVerb(CLI::App& app, const Common& common) {
   auto arguments = std::make_shared<Arguments>();
   app.add_option("dataset", arguments->dataset, "R_d, *.rd.exr")->required();
   app.add_option("--out", arguments->out, "the material, *.nacre.exr")->required();
+  app.add_option("--reuse",
+                 arguments->reuse,
+                 "a material of the same data to begin with: its options (seed, too) "
+                 "are those not given here, and what a changed one leaves of it isn't "
+                 "done again: of the SVDs, fewer terms are its first; notes tell");
   AddOptions(app, arguments->options);
   app.get_option("--bytes")->transform(CLI::AsSizeValue(true));  // 300k, 2MB
-  return [arguments, &common] { return Run(*arguments, common); };
+  return [arguments, &app, &common] { return Run(app, *arguments, common); };
 }
 
 }  // namespace nacre::cli

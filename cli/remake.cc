@@ -13,6 +13,7 @@ using Lines = std::vector<std::string>;
 
 // Verbs whose result is their second word, not an option's value.
 constexpr const char* kMesh = "mesh";
+constexpr const char* kPresetMake = "preset make";
 
 std::string Text(const Json& value) {
   if (value.is_number_float()) {
@@ -74,7 +75,8 @@ class Remaker {
  public:
   // Adds the commands for `name`.
   void Add(const Json& provenance, const std::string& name) {
-    const std::string verb = provenance.value("command", "");
+    const std::string verb =
+        provenance.is_object() ? provenance.value("command", "") : "";
     if (verb.empty()) {
       lines_.push_back("# " + name + ": nothing is known of how it was made");
       return;
@@ -98,9 +100,16 @@ class Remaker {
         line += " --calibration " + inputs[k];
       } else if (verb == "simulate") {
         line += " --photo " + Quoted(inputs[k]);
+      } else if (verb == "factor") {
+        line += " --reuse " + Quoted(inputs[k]);
       }
     }
-    lines_.push_back(line + (verb == kMesh ? "" : " --out " + Quoted(name)));
+    if (verb == kPresetMake) {
+      line += " --out .";  // the library, in which the preset is a folder
+    } else if (verb != kMesh) {
+      line += " --out " + Quoted(name);
+    }
+    lines_.push_back(line);
   }
 
   Lines Take() && { return std::move(lines_); }
@@ -125,6 +134,9 @@ class Remaker {
       if (input.contains("dataset")) {
         names.emplace_back("dataset.rd.exr");
         Add(input.at("dataset"), names.back());
+      } else if (input.contains("material")) {
+        names.push_back(fmt::format("made-{}.nacre.exr", ++made_count_));
+        Add(input.at("material"), std::string(names.back()));
       } else if (input.contains("calibration")) {
         names.emplace_back(kCalibration);
         Add(input.at("calibration"), names.back());
@@ -144,6 +156,7 @@ class Remaker {
   }
 
   Lines lines_;
+  int made_count_ = 0;  // materials that others begin with
 };
 
 }  // namespace

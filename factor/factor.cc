@@ -5,10 +5,14 @@
 #include "core/provenance.h"
 #include "factor/internal/auto_method.h"
 #include "factor/internal/bilinear_data.h"
+#include "factor/internal/equal_rows.h"
 #include "factor/internal/grey.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reciprocal_data.h"
+#include "factor/internal/reuse.h"
 #include "factor/internal/terms_search.h"
+#include "factor/material_file.h"
+#include "reconstruct/clustering.h"
 
 #include <algorithm>
 #include <chrono>
@@ -17,6 +21,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <memory>
+#include <optional>
 #include <utility>
 
 namespace nacre::factor {
@@ -79,6 +84,12 @@ void AddNotes(const FactorOptions& options,
                     most_terms,
                     options.terms));
   }
+  if (summary.factored_slices < points) {
+    summary.notes.push_back(
+        fmt::format("{} of {} slices are distinct: each is factored once",
+                    summary.factored_slices,
+                    points));
+  }
   if (summary.missing_fraction > 0) {
     summary.notes.push_back(
         fmt::format("{:.2f} % of the cells were not measured; the model fills them",
@@ -100,6 +111,7 @@ void AddNotes(const FactorOptions& options,
 void DescribeMaterial(const FactorOptions& options,
                       const reconstruct::RdHeader& header,
                       const FactorSummary& summary,
+                      const Material* made,
                       Material& material) {
   material.method = options.method;
   material.error = {{"relative_l2", summary.relative_l2},
@@ -107,7 +119,8 @@ void DescribeMaterial(const FactorOptions& options,
                     {"log_rms", summary.log_rms},
                     {"psnr_db", summary.psnr_db},
                     {"peak", summary.peak},
-                    {"worst_slice", summary.worst_slice}};
+                    {"worst_slice", summary.worst_slice},
+                    {"missing_fraction", summary.missing_fraction}};
   if (!std::isfinite(summary.psnr_db)) {
     material.error.erase("psnr_db");  // an exact fit has none
   }
@@ -119,6 +132,10 @@ void DescribeMaterial(const FactorOptions& options,
   if (!header.provenance.empty()) {
     provenance.inputs.push_back(
         {{"dataset", ParseJson(header.provenance, "provenance of the dataset")}});
+  }
+  if (made != nullptr && !made->provenance.empty()) {
+    provenance.inputs.push_back(
+        {{"material", ParseJson(made->provenance, "provenance of the material")}});
   }
   material.provenance = provenance.ToString();
 }
@@ -150,19 +167,46 @@ MakeMethod FindMethod(const std::string& name) {
                                fmt::join(FactorMethods(), ", ")));
 }
 
-Factorization FactorSource(SliceSource& source,
-                           const internal::Clusterer& clusterer,
-                           const FactorOptions& asked,
-                           const ProgressFunction& progress) {
-  nacre::Validate(asked);
-  if (asked.method == internal::kAutoMethod) {
-    const bool bilinear_fits =
-        internal::PairBytes(source.header()) <= 1e6 * asked.memory_mb;
-    return internal::FactorByBest(
-        asked, bilinear_fits, [&](const FactorOptions& candidate) {
-          return FactorSource(source, clusterer, candidate, progress);
-        });
+// Where the method is one that takes equal slices once, and there are enough of them.
+std::unique_ptr<internal::DistinctRows> FindDistinct(internal::Job& job) {
+  if (!internal::IsSvd(job.options.method) || internal::KeepsTerms(job)) {
+    return nullptr;
   }
+  std::optional<internal::EqualRows> rows =
+      internal::FindEqualRows(job.source, job.progress);
+  if (!rows) {
+    return nullptr;
+  }
+  ++job.passes;
+  return std::make_unique<internal::DistinctRows>(job.source, std::move(*rows));
+}
+
+// A dataset whose channels are all the same is known by the first of them.
+struct Data {
+  SliceSource& used;  // of that channel alone, or the whole
+  const reconstruct::RdHeader& header;
+  bool is_grey;
+  const Material* made = nullptr;  // as `used`
+};
+
+// The method, and what it needs of the data before.
+std::unique_ptr<internal::Method> Begin(MakeMethod make, internal::Job& job) {
+  if (internal::KeepsTerms(job)) {
+    internal::LookAgain(job);
+    internal::CheckMadeError(job);
+    return internal::MakeCutMethod(job);
+  }
+  internal::Look(job);
+  if (job.made != nullptr) {
+    internal::CheckMadeError(job);
+  }
+  return job.distinct != nullptr ? internal::MakeDistinctSvdMethod(job) : make(job);
+}
+
+Factorization FactorBy(const Data& data,
+                       const internal::Clusterer& clusterer,
+                       const FactorOptions& asked,
+                       const ProgressFunction& progress) {
   const MakeMethod make = FindMethod(asked.method);
   FactorOptions options = asked;
   if (options.terms == 0) {
@@ -170,29 +214,32 @@ Factorization FactorSource(SliceSource& source,
   }
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t cpu_start = std::clock();
-  const std::vector<std::string> channels = source.header().channels;
-  const bool is_grey = options.method != "tucker" && internal::HasEqualChannels(source);
-  internal::FirstChannel first(source);
-  SliceSource& used = is_grey ? first : source;
-  const std::int64_t working_bytes = WorkingBytes(used.header(), options);
-  internal::Job job{used, options, progress, clusterer, {}, {}};
-  internal::Look(job);
-  const std::unique_ptr<internal::Method> method = make(job);
+  const std::int64_t working_bytes = WorkingBytes(data.used.header(), options);
+  internal::Job job{data.used, options, progress, clusterer, {}, {}};
+  job.made = data.made;
+  const std::unique_ptr<internal::DistinctRows> distinct = FindDistinct(job);
+  job.distinct = distinct.get();
+  const std::unique_ptr<internal::Method> method = Begin(make, job);
   Factorization result = internal::SearchTerms(
       job, *method, [&](const FactorSummary& found, Material& material) {
-        DescribeMaterial(options, source.header(), found, material);
-        if (is_grey) {
-          internal::SpreadChannels(channels, material);
+        DescribeMaterial(options, data.header, found, data.made, material);
+        if (data.is_grey) {
+          internal::SpreadChannels(data.header.channels, material);
         }
       });
   FactorSummary& summary = result.summary;
-  if (is_grey) {
-    summary.dataset_bytes *= std::ssize(channels);
+  if (data.is_grey) {
+    summary.dataset_bytes *= std::ssize(data.header.channels);
     summary.notes.push_back("all channels are the same: factored and stored once");
   }
   summary.working_bytes = working_bytes;
+  summary.factored_slices =
+      distinct ? distinct->header().PointCount() : data.header.PointCount();
   summary.passes = job.passes;
-  AddNotes(options, source.header().PointCount(), method->MostTerms(), summary);
+  if (job.made != nullptr) {
+    summary.notes.push_back(internal::NoteOnReuse(job));
+  }
+  AddNotes(options, data.header.PointCount(), method->MostTerms(), summary);
   summary.invariants =
       CheckInvariants(result.material, options.seed, options.thread_count);
   if (const std::string note = summary.invariants.EnergyNote(); !note.empty()) {
@@ -204,7 +251,55 @@ Factorization FactorSource(SliceSource& source,
   return result;
 }
 
+Factorization FactorSource(SliceSource& source,
+                           const internal::Clusterer& clusterer,
+                           const FactorOptions& options,
+                           const Material* made,
+                           const ProgressFunction& progress) {
+  nacre::Validate(options);
+  if (made != nullptr) {
+    internal::CheckMade(*made, source.header(), options);
+  }
+  const bool is_grey = options.method != "tucker" && internal::HasEqualChannels(source);
+  internal::FirstChannel first(source);
+  Material made_first;
+  if (made != nullptr && is_grey) {
+    made_first = ChannelOf(*made, 0);
+    made = &made_first;
+  }
+  const Data data{is_grey ? first : source, source.header(), is_grey, made};
+  if (options.method != internal::kAutoMethod) {
+    return FactorBy(data, clusterer, options, progress);
+  }
+  const bool bilinear_fits =
+      internal::PairBytes(data.used.header()) <= 1e6 * options.memory_mb;
+  return internal::FactorByBest(
+      options, bilinear_fits, [&](const FactorOptions& candidate) {
+        return FactorBy(data, clusterer, candidate, progress);
+      });
+}
+
+// Of a dataset or its reader.
+template <class Dataset>
+Factorization FactorData(Dataset& dataset,
+                         const FactorOptions& options,
+                         const Material* made,
+                         const ProgressFunction& progress) {
+  return FactorSource(
+      *internal::SourceOf(dataset),
+      [&](const reconstruct::ClusterOptions& clusters, const ProgressFunction& report) {
+        return reconstruct::ClusterSlices(dataset, clusters, report);
+      },
+      options,
+      made,
+      progress);
+}
+
 }  // namespace
+
+bool SharesWork(const std::string& method) {
+  return internal::IsSvd(method);
+}
 
 const std::vector<std::string>& FactorMethods() {
   static const std::vector<std::string> names = [] {
@@ -220,25 +315,27 @@ const std::vector<std::string>& FactorMethods() {
 Factorization Factor(const reconstruct::RdDataset& dataset,
                      const FactorOptions& options,
                      const ProgressFunction& progress) {
-  return FactorSource(
-      *internal::SourceOf(dataset),
-      [&](const reconstruct::ClusterOptions& clusters, const ProgressFunction& report) {
-        return reconstruct::ClusterSlices(dataset, clusters, report);
-      },
-      options,
-      progress);
+  return FactorData(dataset, options, nullptr, progress);
 }
 
 Factorization Factor(reconstruct::RdReader& reader,
                      const FactorOptions& options,
                      const ProgressFunction& progress) {
-  return FactorSource(
-      *internal::SourceOf(reader),
-      [&](const reconstruct::ClusterOptions& clusters, const ProgressFunction& report) {
-        return reconstruct::ClusterSlices(reader, clusters, report);
-      },
-      options,
-      progress);
+  return FactorData(reader, options, nullptr, progress);
+}
+
+Factorization FactorAgain(const Material& made,
+                          const reconstruct::RdDataset& dataset,
+                          const FactorOptions& options,
+                          const ProgressFunction& progress) {
+  return FactorData(dataset, options, &made, progress);
+}
+
+Factorization FactorAgain(const Material& made,
+                          reconstruct::RdReader& reader,
+                          const FactorOptions& options,
+                          const ProgressFunction& progress) {
+  return FactorData(reader, options, &made, progress);
 }
 
 }  // namespace nacre::factor

@@ -11,6 +11,10 @@
 #include <string>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::factor {
 
 /// How a dataset is factored. `thread_count` and `seed` aren't listed in Visit: every
@@ -27,6 +31,7 @@ struct FactorOptions {
   double bits = 0;
   double tail_weight = 1;
   bool one_by_one = false;
+  bool divide_falloff = false;
   int check_slices = 4096;
   int polynomial = 3;
   int window_rank = 1;
@@ -36,8 +41,9 @@ struct FactorOptions {
   double totals = 0.01;
   double memory_mb = 1000;
 
-  int thread_count = 0;    ///< 0: all cores; doesn't change a bit of the result
-  std::uint64_t seed = 1;  ///< of the sample of rows and of the clustering
+  int thread_count = 0;          ///< 0: all cores; doesn't change a bit of the result
+  const Ranks* ranks = nullptr;  ///< nor do these, if SharesWork(); all get the same
+  std::uint64_t seed = 1;        ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -87,6 +93,11 @@ struct FactorOptions {
           Range{},
           "of the SVDs: each term from the residual of those before, as the thesis has "
           "it; the same to rounding, and slower");
+    visit("divide_falloff",
+          self.divide_falloff,
+          Range{},
+          "of svd and sqrt-svd: slices are divided by the mean slice first, which "
+          "counts errors in the tails as those at the peak");
     visit(
         "check_slices",
         self.check_slices,
@@ -124,12 +135,17 @@ struct FactorOptions {
           Range{0, 1},
           "of reciprocal: slices' totals stay within this of the measured ones; 1: as "
           "they come");
-    visit("memory_mb",
-          self.memory_mb,
-          Range{1, 1e6},
-          "of reciprocal: for the pairs that maps are fitted to; less takes fewer");
+    visit(
+        "memory_mb",
+        self.memory_mb,
+        Range{1, 1e6},
+        "for pairs of points: reciprocal fits its maps to fewer if these are all that "
+        "fit; bilinear needs all of them and says so");
   }
 };
+
+/// Whether ranks can share the work of that method. Of others each does all of it.
+bool SharesWork(const std::string& method);
 
 /// Names that FactorOptions::method may take, beside "auto".
 const std::vector<std::string>& FactorMethods();
@@ -153,7 +169,9 @@ struct FactorSummary {
   double psnr_db = 0;         ///< 20 log10(peak / RMSE)
   double peak = 0;            ///< largest measurement, mm⁻²
   std::int64_t measured_slices = 0;  ///< that errors are of: all, or a sample
-  double worst_slice = 0;            ///< largest relative L2 error of these
+  /// Slices that were factored: all, or, where many are equal, one of each (SVDs).
+  std::int64_t factored_slices = 0;
+  double worst_slice = 0;  ///< largest relative L2 error of these
   int worst_slice_i = 0;
   int worst_slice_j = 0;
   double worst_total =
@@ -162,6 +180,7 @@ struct FactorSummary {
   std::int64_t unfit_slices = 0;  ///< model or measured total not positive: not scaled
   std::vector<TermsError> error_curve;
   int passes = 0;                  ///< times that all slices were read
+  int rounds = 0;                  ///< of fits that alternate, all matrices and tries
   int search_steps = 0;            ///< pairs (A, B) tried, all channels
   std::int64_t working_bytes = 0;  ///< estimated, beside dataset and material
   double cpu_seconds = 0;          ///< of the whole process while factoring
@@ -181,7 +200,8 @@ struct Factorization {
 /// Factors a dataset, in memory or streamed from its file. The SVDs read it four times
 /// (scan, sums, projection, errors), large data once (`check_slices`), once more to
 /// cluster, `fill_rounds` times more if values are missing; bilinear reads it three
-/// times and holds all pairs of points, 5 bytes each. What each holds and `bytes` and
+/// times and holds all pairs of points, 5 bytes each, for which `memory_mb` must do (a
+/// usage Error says how much is needed). What each holds and `bytes` and
 /// `error` add: README.md. The same data, options and seed give the same bits whatever
 /// the thread count.
 ///
@@ -194,5 +214,30 @@ Factorization Factor(const reconstruct::RdDataset& dataset,
 Factorization Factor(reconstruct::RdReader& reader,
                      const FactorOptions& options,
                      const ProgressFunction& progress = {});
+
+/// The same beginning with `made`, a material of the same data by the same method. Of
+/// the SVDs, options being what they were but for `terms` (no more), `bytes`, `error`,
+/// `bits` and what errors are measured on, its leading terms are taken and nothing is
+/// fitted: slices are read once, or, where all were measured and 8192 slices are
+/// there, `check_slices` of them. Else clusters are kept where their number and seed
+/// are, A and B where what they are chosen by is; nmf, bilinear and reciprocal begin
+/// with its kernels or maps. A note says what was taken. Where `made` holds rounded
+/// values, these are what is taken.
+///
+/// Throws, beside the above, a usage Error for another method or one that nothing can
+/// be kept of (tucker, profiles, auto), BadData if `made` isn't of these data by its
+/// size, provenance or error.
+Factorization FactorAgain(const Material& made,
+                          const reconstruct::RdDataset& dataset,
+                          const FactorOptions& options,
+                          const ProgressFunction& progress = {});
+Factorization FactorAgain(const Material& made,
+                          reconstruct::RdReader& reader,
+                          const FactorOptions& options,
+                          const ProgressFunction& progress = {});
+
+/// Those that a material was made with, by its provenance, but for `bytes` and `error`;
+/// what that doesn't tell is as it is by default.
+FactorOptions OptionsOf(const Material& made);
 
 }  // namespace nacre::factor

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "factor/internal/bilinear_fit.h"
 #include "factor/internal/method.h"
+#include "factor/internal/reuse.h"
 
 #include <algorithm>
 
@@ -22,13 +23,16 @@ class BilinearMethod final : public Method {
  public:
   explicit BilinearMethod(Job& job)
       : job_(Checked(job)),
-        data_(ReadPairs(job, job.options.terms, job.options.tail_weight, start_)) {}
+        data_(ReadPairs(job, job.options.terms, job.options.tail_weight, start_)) {
+    BeginWithMade(job, start_);
+  }
 
   int MostTerms() const override { return static_cast<int>(start_.rows()); }
 
   Material Make(int terms) override {
     const BilinearFit fit = FitBilinear(
         data_, start_.topRows(terms), job_.options.thread_count, job_.progress);
+    rounds_ += fit.rounds;
     Material m = EmptyMaterial(job_.source.header());
     m.form = Form::kBilinear;
     m.terms = terms;
@@ -51,12 +55,13 @@ class BilinearMethod final : public Method {
     return m;
   }
 
-  void Describe(FactorSummary&) const override {}
+  void Describe(FactorSummary& summary) const override { summary.rounds = rounds_; }
 
  private:
   Job& job_;
   SharedMaps start_;
   BilinearData data_;
+  int rounds_ = 0;
 };
 
 }  // namespace

@@ -53,25 +53,33 @@ void FitByBlocks(SliceSource& source,
   const std::size_t channel_count = model.scans.size();
   const bool has_missing = HasMissing(model, header);
 
-  const auto fill = [&](const SliceBlock& block,
-                        std::int64_t row,
-                        std::size_t channel,
-                        float* y) {
-    const auto offset =
-        (static_cast<std::size_t>(row) * channel_count + channel) * window;
-    if (options.rows != nullptr) {
-      options.rows->Add(channel, block.first + row, {block.rd + offset, window});
-      if (std::memchr(block.valid + offset, 0, window) != nullptr) {
-        options.rows->has_missing = true;
-      }
-    }
-    if (!has_missing || std::memchr(block.valid + offset, 0, window) == nullptr) {
-      return TransformFloats(model.transforms[channel], {block.rd + offset, window}, y);
-    }
-    std::vector<double> values(window);
-    CompleteRow(model, block, row, channel, values);
-    return CopyRow(values, y);
-  };
+  const auto fill =
+      [&](const SliceBlock& block, std::int64_t row, std::size_t channel, float* y) {
+        const auto offset =
+            (static_cast<std::size_t>(row) * channel_count + channel) * window;
+        if (options.rows != nullptr) {
+          options.rows->Add(channel, block.first + row, {block.rd + offset, window});
+          if (std::memchr(block.valid + offset, 0, window) != nullptr) {
+            options.rows->has_missing = true;
+          }
+        }
+        if (!has_missing || std::memchr(block.valid + offset, 0, window) == nullptr) {
+          const std::vector<double>& falloff = model.scans[channel].falloff;
+          if (falloff.empty()) {
+            return TransformFloats(
+                model.transforms[channel], {block.rd + offset, window}, y);
+          }
+          std::vector<float> divided(window);
+          for (std::size_t cell = 0; cell < window; ++cell) {
+            divided[cell] = static_cast<float>(
+                static_cast<double>(block.rd[offset + cell]) / falloff[cell]);
+          }
+          return TransformFloats(model.transforms[channel], divided, y);
+        }
+        std::vector<double> values(window);
+        CompleteRow(model, block, row, channel, values);
+        return CopyRow(values, y);
+      };
   std::vector<std::size_t> channels(channel_count);
   for (std::size_t c = 0; c < channel_count; ++c) {
     channels[c] = c;
@@ -82,7 +90,7 @@ void FitByBlocks(SliceSource& source,
                          .tolerance = options.tolerance,
                          .least_passes = has_missing ? 1 + options.fill_rounds : 1,
                          .spare = source.in_memory() ? 4 : kSpareOfFiles,
-                         .thread_count = options.thread_count});
+                         .workers = {options.thread_count, options.ranks}});
   std::vector<RowBasis> bases(channel_count);
   solver.OnBasis([&](std::size_t channel, const BlockSvd& svd) {
     bases[channel] = ToBasis(svd, header);
@@ -97,9 +105,16 @@ void FitByBlocks(SliceSource& source,
   const Sample& sample = options.sample == nullptr ? taken : *options.sample;
   BlockSvds found = solver.Solve(*SourceOf(sample.dataset), source, progress);
   model.passes += found.passes;
+  if (options.rows != nullptr) {
+    options.rows->Join(options.ranks);
+  }
   for (BlockSvd& svd : found.svds) {
     model.excess = std::max(model.excess, svd.excess);
     if (!has_missing) {  // else they belong to the values filled before
+      JoinPassRows(header.PointCount(),
+                   static_cast<std::size_t>(svd.sigma.size()),
+                   options.ranks,
+                   std::span<float>(svd.scores));
       model.scores.push_back(std::move(svd.scores));
     }
   }

@@ -1,5 +1,6 @@
 #include "factor/internal/block_pass.h"
 
+#include "core/lot_sum.h"
 #include "core/parallel.h"
 #include "factor/internal/row_kernels.h"
 
@@ -10,10 +11,25 @@ namespace {
 
 constexpr std::int64_t kRows = 128;  // whose sums are floats; they fit the cache
 constexpr std::int64_t kLanes = 8;   // sums kept apart, so that as many threads can add
+constexpr std::int64_t kChunk = kRows * kLanes;  // read at a time
+constexpr std::int64_t kMostLots = 64;           // of chunks, summed apart for ranks
+
+std::int64_t ChunkCount(std::int64_t points) {
+  return (points + kChunk - 1) / kChunk;
+}
+
+std::int64_t LotCount(std::int64_t points) {
+  return std::min(kMostLots, ChunkCount(points));
+}
+
+// The first row of a lot.
+std::int64_t LotBegin(std::int64_t lot, std::int64_t points) {
+  return std::min(points, lot * ChunkCount(points) / LotCount(points) * kChunk);
+}
 
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// The sums of every eighth block of rows.
+// The sums of every eighth block of a lot's rows.
 struct Lane {
   std::vector<double> z;  // [panel][column][kPanel]
   Eigen::MatrixXd gram;
@@ -38,11 +54,7 @@ class ChannelPass {
       }
     }
     product_.u.resize(static_cast<std::size_t>(row_count * basis.cols()));
-    for (Lane& lane : lanes_) {
-      lane.z.assign(v_.size(), 0.0);
-      lane.gram = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
-      lane.sum = Eigen::VectorXd::Zero(basis.cols());
-    }
+    Clear();
   }
 
   // Rows [first, first + count) of the pass, `count` ≤ kRows.
@@ -67,7 +79,8 @@ class ChannelPass {
     lane.sum += u.colwise().sum().transpose();
   }
 
-  BlockProduct Finish() {
+  // Appends what was added since the last call to `sums`.
+  void TakeLot(std::vector<double>& sums) {
     Lane& total = lanes_.front();
     for (std::size_t n = 1; n < lanes_.size(); ++n) {
       std::transform(total.z.begin(),
@@ -79,20 +92,47 @@ class ChannelPass {
       total.sum += lanes_[n].sum;
       total.squares += lanes_[n].squares;
     }
-    product_.z.resize(columns_, total.sum.size());
-    for (Eigen::Index k = 0; k < product_.z.cols(); ++k) {
+    sums.insert(sums.end(), total.z.begin(), total.z.end());
+    sums.insert(sums.end(), total.gram.data(), total.gram.data() + total.gram.size());
+    sums.insert(sums.end(), total.sum.begin(), total.sum.end());
+    sums.push_back(total.squares);
+    Clear();
+  }
+
+  // `sums`: of all lots, from which it takes its own off the front.
+  BlockProduct Finish(std::span<const double>& sums) {
+    const Eigen::Index size = panels_ * kPanel;
+    const auto take = [&](Eigen::Index count) {
+      const std::span<const double> front = sums.first(static_cast<std::size_t>(count));
+      sums = sums.subspan(front.size());
+      return front;
+    };
+    const std::span<const double> z = take(std::ssize(v_));
+    product_.z.resize(columns_, size);
+    for (Eigen::Index k = 0; k < size; ++k) {
       for (Eigen::Index column = 0; column < columns_; ++column) {
-        product_.z(column, k) = total.z[PanelIndex(k / kPanel, width_, column) +
-                                        static_cast<std::size_t>(k % kPanel)];
+        product_.z(column, k) = z[PanelIndex(k / kPanel, width_, column) +
+                                  static_cast<std::size_t>(k % kPanel)];
       }
     }
-    product_.gram = std::move(total.gram);
-    product_.sum = std::move(total.sum);
-    product_.squares = total.squares;
+    product_.gram =
+        Eigen::Map<const Eigen::MatrixXd>(take(size * size).data(), size, size);
+    product_.sum = Eigen::Map<const Eigen::VectorXd>(take(size).data(), size);
+    product_.squares = take(1).front();
     return std::move(product_);
   }
 
  private:
+  void Clear() {
+    const Eigen::Index size = panels_ * kPanel;
+    for (Lane& lane : lanes_) {
+      lane.z.assign(v_.size(), 0.0);
+      lane.gram = Eigen::MatrixXd::Zero(size, size);
+      lane.sum = Eigen::VectorXd::Zero(size);
+      lane.squares = 0;
+    }
+  }
+
   static std::size_t PanelIndex(std::int64_t panel,
                                 std::int64_t height,
                                 std::int64_t row) {
@@ -110,11 +150,21 @@ class ChannelPass {
 
 }  // namespace
 
+RankShare PassShare(std::int64_t points, int rank, int size) {
+  const RankShare lots = ShareOf(LotCount(points), rank, size);
+  return {LotBegin(lots.begin, points), LotBegin(lots.end, points)};
+}
+
+RankShare PassShare(std::int64_t points, const Ranks* ranks) {
+  return ranks == nullptr ? RankShare{0, points}
+                          : PassShare(points, ranks->rank(), ranks->size());
+}
+
 std::vector<BlockProduct> RunBlockPass(SliceSource& source,
                                        const FillRowFunction& fill,
                                        const std::vector<std::size_t>& channels,
                                        const std::vector<Eigen::MatrixXd>& bases,
-                                       int thread_count,
+                                       const PassWorkers& workers,
                                        const ProgressFunction& progress,
                                        const std::string& note) {
   const std::int64_t points = source.header().PointCount();
@@ -123,12 +173,10 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
     passes.emplace_back(basis, points);
   }
   const auto matrices = static_cast<std::int64_t>(channels.size());
-  for (std::int64_t first = 0; first < points; first += kRows * kLanes) {
-    Report(progress, {"factor", first, points, note});
-    const SliceBlock block =
-        source.Read(first, std::min(kRows * kLanes, points - first));
+  const auto add_chunk = [&](std::int64_t first, std::int64_t end) {
+    const SliceBlock block = source.Read(first, std::min(kChunk, end - first));
     const std::int64_t parts = (block.count + kRows - 1) / kRows;
-    ParallelFor(matrices * parts, thread_count, [&](std::int64_t task) {
+    ParallelFor(matrices * parts, workers.thread_count, [&](std::int64_t task) {
       const auto matrix = static_cast<std::size_t>(task / parts);
       const std::int64_t start = task % parts * kRows;
       passes[matrix].Add(first + start,
@@ -137,10 +185,26 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
                            return fill(block, start + row, channels[matrix], y);
                          });
     });
+  };
+  LotSum sum(LotCount(points), workers.ranks);
+  const RankShare lots = ShareOf(LotCount(points), workers.ranks);
+  for (std::int64_t lot = lots.begin; lot < lots.end; ++lot) {
+    const std::int64_t end = LotBegin(lot + 1, points);
+    for (std::int64_t first = LotBegin(lot, points); first < end; first += kChunk) {
+      Report(progress, {"factor", first, points, note});
+      add_chunk(first, end);
+    }
+    std::vector<double> sums;
+    for (ChannelPass& pass : passes) {
+      pass.TakeLot(sums);
+    }
+    sum.Add(std::move(sums));
   }
+  const std::vector<double> total = sum.Finish();
+  std::span<const double> left = total;
   std::vector<BlockProduct> products;
   for (ChannelPass& pass : passes) {
-    products.push_back(pass.Finish());
+    products.push_back(pass.Finish(left));
   }
   return products;
 }

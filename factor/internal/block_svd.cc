@@ -142,7 +142,7 @@ void BlockSvdSolver::SolveSample(SliceSource& sample,
   const Eigen::Index size = bases_.front().cols();
   for (int pass = 0; pass < kMostSamplePasses; ++pass) {
     const std::vector<BlockProduct> products = RunBlockPass(
-        sample, fill_, channels_, bases_, options_.thread_count, progress, "sample");
+        sample, fill_, channels_, bases_, options_.workers, progress, "sample");
     double excess = 0;
     for (std::size_t n = 0; n < products.size(); ++n) {
       const Ritz ritz = RayleighRitz(products[n], bases_[n], options_.terms);
@@ -164,7 +164,7 @@ BlockSvds BlockSvdSolver::Solve(SliceSource& sample,
   const Eigen::Index size = bases_.front().cols();
   while (true) {
     const std::vector<BlockProduct> products = RunBlockPass(
-        source, fill_, channels_, bases_, options_.thread_count, progress, "products");
+        source, fill_, channels_, bases_, options_.workers, progress, "products");
     ++result.passes;
     result.svds.clear();
     double excess = 0;

@@ -19,14 +19,14 @@ struct BlockSvdOptions {
   int least_passes = 1;
   int most_passes = 12;
   int spare = 4;  ///< columns beyond the terms, at least: more save passes
-  int thread_count = 0;
+  PassWorkers workers = {};
 };
 
 /// One matrix' truncated SVD.
 struct BlockSvd {
   Eigen::VectorXd sigma;      ///< largest first
   Eigen::MatrixXd vectors;    ///< columns × rank, orthonormal, signs canonical
-  std::vector<float> scores;  ///< [row][rank]: U Σ
+  std::vector<float> scores;  ///< [row][rank]: U Σ, of other ranks' rows 0
   Eigen::VectorXd mean;       ///< of the scores over the rows
   double squares = 0;         ///< Σ y²
   double excess = 0;          ///< estimated, see BlockSvdOptions::tolerance

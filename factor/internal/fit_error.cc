@@ -38,6 +38,14 @@ FitError& FitError::operator+=(const FitError& other) {
   return *this;
 }
 
+void FitError::Repeat(std::int64_t times) {
+  for (double* sum : {&error2, &signal2, &signal, &model, &log2}) {
+    *sum *= static_cast<double>(times);
+  }
+  used *= times;
+  log_used *= times;
+}
+
 double FitError::RelativeL2() const {
   return std::sqrt(Ratio(error2, signal2));
 }

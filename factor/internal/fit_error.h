@@ -18,6 +18,8 @@ struct FitError {
   /// `floor` bounds both numbers in the logarithm; infinity: none is taken.
   void Add(double measured, double modelled, double floor);
   FitError& operator+=(const FitError& other);
+  /// As if all had been added so many times.
+  void Repeat(std::int64_t times);
 
   double RelativeL2() const;    ///< √(Σ error² / Σ measured²); 0 where both are 0
   double Rmse() const;          ///< mm⁻²

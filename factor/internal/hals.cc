@@ -60,19 +60,25 @@ void HalsSweep(const Eigen::MatrixXd& gram,
 }
 
 Nonnegative FactorNonnegative(const RowMatrix& y,
+                              const RowMatrix& start,
                               int terms,
                               int rounds,
                               std::uint64_t seed) {
-  const std::vector<Eigen::Index> rows = SpreadRows(y, terms, seed);
+  const Eigen::Index given = std::min<Eigen::Index>(terms, start.rows());
+  const auto more = terms - static_cast<int>(given);
+  const std::vector<Eigen::Index> rows =
+      more > 0 ? SpreadRows(y, more, seed) : std::vector<Eigen::Index>{};
   Nonnegative model;
-  model.h.resize(static_cast<Eigen::Index>(rows.size()), y.cols());
-  for (Eigen::Index j = 0; j < model.h.rows(); ++j) {
-    model.h.row(j) = y.row(rows[static_cast<std::size_t>(j)]).cwiseMax(0);
+  model.h.resize(given + std::ssize(rows), y.cols());
+  model.h.topRows(given) = start.topRows(given).cwiseMax(0);
+  for (std::size_t j = 0; j < rows.size(); ++j) {
+    model.h.row(given + static_cast<Eigen::Index>(j)) = y.row(rows[j]).cwiseMax(0);
   }
   model.f = Eigen::MatrixXd::Constant(y.rows(), model.h.rows(), 1.0);
   const double squares = y.squaredNorm();
   double before = 0;
   for (int round = 0; round < rounds; ++round) {
+    model.rounds = round + 1;
     const Eigen::MatrixXd gram = model.h * model.h.transpose();
     const Eigen::MatrixXd cross = y * model.h.transpose();
     // Products with Y cost most: what they give is used twice.

@@ -10,6 +10,7 @@ namespace nacre::factor::internal {
 struct Nonnegative {
   Eigen::MatrixXd f;  ///< rows × terms
   RowMatrix h;        ///< terms × columns
+  int rounds = 0;
 };
 
 /// One sweep of hierarchical alternating least squares over the columns of `f`: each in
@@ -21,9 +22,10 @@ void HalsSweep(const Eigen::MatrixXd& gram,
                Eigen::MatrixXd& f);
 
 /// F and H of at most `terms` terms, the error not falling by 1e-5 a round any more or
-/// after `rounds`. H starts as rows of Y that lie far apart, chosen by `seed`. Negative
-/// entries of Y count, but nothing follows them below zero.
+/// after `rounds`. H starts as the rows of `start`, then rows of Y that lie far apart,
+/// chosen by `seed`. Negative entries of Y count, but nothing follows them below zero.
 Nonnegative FactorNonnegative(const RowMatrix& y,
+                              const RowMatrix& start,
                               int terms,
                               int rounds,
                               std::uint64_t seed);

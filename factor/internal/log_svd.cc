@@ -49,6 +49,7 @@ class GramPass {
     for (std::size_t c = 0; c < rows.size(); ++c) {
       Transform(block, c, rows[c]);
     }
+    FindWeights(block);
     const std::int64_t clusters = options_.cluster_count;
     const std::int64_t panels = (window_ + kPanelColumns - 1) / kPanelColumns;
     ParallelFor(
@@ -59,7 +60,10 @@ class GramPass {
           if (y.rows() > 0) {
             const Eigen::Index first = (t % panels) * kPanelColumns;
             sums_[sum_index].AddPanel(
-                y, first, std::min(kPanelColumns, window_ - first));
+                y,
+                weights_[sum_index % static_cast<std::size_t>(clusters)],
+                first,
+                std::min(kPanelColumns, window_ - first));
           }
         });
   }
@@ -90,6 +94,20 @@ class GramPass {
     }
   }
 
+  // How often each row of a cluster counts.
+  void FindWeights(const SliceBlock& block) {
+    std::vector<std::vector<double>> weights(
+        static_cast<std::size_t>(options_.cluster_count));
+    for (std::int64_t row = 0; row < block.count; ++row) {
+      weights[ClusterOf(block, row)].push_back(
+          block.weight == nullptr ? 1 : static_cast<double>(block.weight[row]));
+    }
+    weights_.clear();
+    for (const std::vector<double>& of : weights) {
+      weights_.push_back(Eigen::Map<const Eigen::VectorXd>(of.data(), std::ssize(of)));
+    }
+  }
+
   std::size_t ClusterOf(const SliceBlock& block, std::int64_t row) const {
     return model_.cluster[static_cast<std::size_t>(block.first + row)];
   }
@@ -99,6 +117,7 @@ class GramPass {
   const SvdModel& model_;
   Eigen::Index window_;
   std::vector<GramSum> sums_;
+  std::vector<Eigen::VectorXd> weights_;  // of a block's rows, [cluster]
   std::vector<int> missing_;
 };
 
@@ -124,11 +143,12 @@ int CompleteRow(const SvdModel& model,
   const Eigen::VectorXd predicted =
       basis.vectors * basis.PartialCoordinates(values, valid);
   // Predictions stay within what was measured anywhere in the channel.
-  const double low = transform.Forward(std::min(0.0, scan.least));
-  const double high = transform.Forward(std::max(0.0, scan.peak));
   for (std::size_t cell = 0; cell < window; ++cell) {
     if (valid[cell] == 0) {
-      values[cell] = std::clamp(predicted(static_cast<Eigen::Index>(cell)), low, high);
+      const double g = scan.falloff.empty() ? 1 : scan.falloff[cell];
+      values[cell] = std::clamp(predicted(static_cast<Eigen::Index>(cell)),
+                                transform.Forward(std::min(0.0, scan.least) / g),
+                                transform.Forward(std::max(0.0, scan.peak) / g));
     }
   }
   return missing;
@@ -162,6 +182,9 @@ int TransformRow(std::span<const float> rd,
                  const RowTransform& transform,
                  std::span<double> row) {
   const int missing = FillRow(rd, valid, scan, row);
+  for (std::size_t cell = 0; cell < scan.falloff.size(); ++cell) {
+    row[cell] /= scan.falloff[cell];
+  }
   for (double& value : row) {
     value = transform.Forward(value);
   }
@@ -208,10 +231,12 @@ Material ToMaterial(const SvdModel& model,
         const std::size_t at = ((c * clusters + k) * static_cast<std::size_t>(terms) +
                                 static_cast<std::size_t>(j)) *
                                window;
+        const std::vector<double>& falloff = model.scans[c].falloff;
         for (std::size_t cell = 0; cell < window; ++cell) {
-          m.h[at + cell] =
-              static_cast<float>(basis.vectors(static_cast<Eigen::Index>(cell), j) *
-                                 basis.sigma(j) * scale);
+          const double g = falloff.empty() ? 1 : falloff[cell];
+          m.h[at + cell] = static_cast<float>(
+              basis.vectors(static_cast<Eigen::Index>(cell), j) * basis.sigma(j) *
+              scale * (transform.is_root ? std::sqrt(g) : g));
         }
       }
     }

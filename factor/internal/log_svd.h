@@ -24,6 +24,7 @@ struct SvdFitOptions {
   double tolerance = 1e-5;  ///< on the excess error, where found by iteration
   std::uint64_t seed = 1;   ///< of the rows that the iteration starts on
   int thread_count = 0;
+  const Ranks* ranks = nullptr;  ///< that share passes of FitByBlocks
   /// Given both, FitByBlocks starts on these rows and, taking it that nothing is
   /// missing, tells of all rows what it reads.
   const Sample* sample = nullptr;
@@ -103,7 +104,7 @@ Eigen::VectorXd RowCoordinates(const RowBasis& basis,
 
 /// Kernels and transform attributes as a Material keeps them; its f is sized and zero.
 /// f_j gets a root mean square of 1 over the rows, h_j takes
-/// the singular value; the linear model's scale goes into h too.
+/// the singular value; the linear model's scale and fall-off go into h too.
 Material ToMaterial(const SvdModel& model,
                     const reconstruct::RdHeader& header,
                     int terms);

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "reconstruct/error_figures.h"
 
 #include <algorithm>
 #include <cmath>
@@ -26,6 +27,7 @@ void ScanRow(const RdHeader& header,
              Sums& sums) {
   const std::int64_t offset = row * header.SliceSize() +
                               static_cast<std::int64_t>(channel) * header.WindowSize();
+  const std::int64_t weight = block.weight == nullptr ? 1 : block.weight[row];
   for (std::int64_t cell = 0; cell < header.WindowSize(); ++cell) {
     if (block.valid[offset + cell] == 0) {
       continue;
@@ -46,10 +48,10 @@ void ScanRow(const RdHeader& header,
     const auto n = static_cast<std::size_t>(cell);
     sums.scan.peak = std::max(sums.scan.peak, rd);
     sums.scan.least = std::min(sums.scan.least, rd);
-    sums.scan.sum += rd;
-    ++sums.scan.used;
-    sums.total[n] += rd;
-    ++sums.count[n];
+    sums.scan.sum += static_cast<double>(weight) * rd;
+    sums.scan.used += weight;
+    sums.total[n] += static_cast<double>(weight) * rd;
+    sums.count[n] += weight;
   }
 }
 
@@ -96,7 +98,7 @@ std::vector<ChannelScan> Scan(SliceSource& source, int thread_count) {
   const auto window = static_cast<std::size_t>(header.WindowSize());
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   std::vector<Sums> sums(header.channels.size(),
-                         {{-kInfinity, kInfinity, 0, 0, {}},
+                         {{-kInfinity, kInfinity, 0, 0, {}, {}},
                           std::vector<double>(window, 0.0),
                           std::vector<std::int64_t>(window, 0)});
   for (std::int64_t first = 0; first < header.PointCount(); first += kBlockRows) {
@@ -126,6 +128,17 @@ std::vector<ChannelScan> Scan(SliceSource& source, int thread_count) {
     scans.push_back(std::move(sums[c].scan));
   }
   return scans;
+}
+
+std::vector<double> MeanFalloff(const ChannelScan& scan) {
+  const double largest = *std::max_element(scan.mean.begin(), scan.mean.end());
+  const double scale = largest > 0 ? largest : 1;
+  const double least = std::max(-scan.least / scale, reconstruct::kLogFloor);
+  std::vector<double> falloff;
+  for (const double mean : scan.mean) {
+    falloff.push_back(std::max(mean / scale, least));
+  }
+  return falloff;
 }
 
 int FillRow(std::span<const float> rd,

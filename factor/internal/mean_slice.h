@@ -15,7 +15,13 @@ struct ChannelScan {
   double sum = 0;            ///< Σ R_d
   std::int64_t used = 0;     ///< valid values
   std::vector<double> mean;  ///< the average slice; cells never valid take their ring's
+  std::vector<double> falloff;  ///< what a fit divides slices by; empty: nothing
 };
+
+/// G(d) [Peers06; Oenel14, eq. 4.2]: the mean slice over its largest value, but no less
+/// than noise comes to, which the depth of the lowest value below zero tells, or than
+/// kLogFloor. Positive.
+std::vector<double> MeanFalloff(const ChannelScan& scan);
 
 /// Scans all channels. Throws BadData naming slice, channel and cell of the first value
 /// that isn't finite, and for a channel without one valid value.

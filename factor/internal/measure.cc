@@ -1,6 +1,8 @@
 #include "factor/internal/measure.h"
 
 #include "core/parallel.h"
+#include "core/ranks.h"
+#include "factor/internal/equal_rows.h"
 #include "factor/internal/material_codes.h"
 #include "factor/internal/reciprocal.h"
 #include "factor/internal/reciprocal_sums.h"
@@ -19,8 +21,9 @@ namespace {
 constexpr float kMostSteps = 0x1p24F;
 constexpr float kMostHalf = 65504;
 
-// The errors of one slice.
+// The errors of one slice, or of all that are equal to it.
 struct SliceFit {
+  std::int64_t slices = 1;
   FitError error;
   double worst_channel = 0;
   double worst_total = 0;
@@ -87,11 +90,13 @@ void Summarize(const Job& job,
                const Material& m,
                FactorSummary& summary) {
   FitError sum;
+  std::int64_t slices = 0;
   summary.unfit_slices = 0;
   summary.worst_slice = 0;
   summary.worst_total = 0;
   for (std::size_t n = 0; n < fits.size(); ++n) {
     sum += fits[n].error;
+    slices += fits[n].slices;
     summary.worst_total = std::max(summary.worst_total, fits[n].worst_total);
     summary.unfit_slices += fits[n].unfit;
     if (fits[n].worst_channel > summary.worst_slice) {
@@ -110,9 +115,9 @@ void Summarize(const Job& job,
   summary.psnr_db = rmse > 0 && summary.peak > 0
                         ? 20 * std::log10(summary.peak / rmse)
                         : std::numeric_limits<double>::infinity();
-  summary.measured_slices = std::ssize(fits);
+  summary.measured_slices = slices;
   summary.missing_fraction =
-      1 - static_cast<double>(sum.used) / (cells * static_cast<double>(fits.size()) /
+      1 - static_cast<double>(sum.used) / (cells * static_cast<double>(slices) /
                                            static_cast<double>(m.PointCount()));
   summary.dataset_bytes = static_cast<std::int64_t>(cells * sizeof(float));
   summary.terms = m.terms;
@@ -174,15 +179,30 @@ SliceFit ScaleAll(const Job& job, Material& m) {
   return WorstOf(fits);
 }
 
+// Collective: the fits of all ranks one after the other, in all of them.
+void Join(const Ranks* ranks, std::vector<SliceFit>& fits) {
+  if (ranks == nullptr) {
+    return;
+  }
+  const auto parts = ranks->AllGather(ToBytes(std::span<const SliceFit>(fits)));
+  fits.clear();
+  for (const std::string& part : parts) {
+    const auto those = FromBytes<SliceFit>(part);
+    fits.insert(fits.end(), those.begin(), those.end());
+  }
+}
+
 // Totals are those of all slices; errors are measured on some.
 void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
   const SliceFit all = m.form == Form::kReciprocal ? SumAll(job, m) : ScaleAll(job, m);
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const double floor = reconstruct::kLogFloor * job.Peak();
   const reconstruct::RdDataset& data = job.check.dataset;
-  std::vector<SliceFit> fits(job.check.rows.size());
-  ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t row) {
-    const auto r = static_cast<std::size_t>(row);
+  const RankShare share = ShareOf(std::ssize(job.check.rows), job.options.ranks);
+  std::vector<SliceFit> fits(static_cast<std::size_t>(share.end - share.begin));
+  ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t n) {
+    SliceFit& fit = fits[static_cast<std::size_t>(n)];
+    const auto r = static_cast<std::size_t>(share.begin + n);
     const std::int64_t point = job.check.rows[r];
     std::vector<float> windows(window * m.channels.size());
     const GridIndex index{static_cast<int>(point % m.points_x),
@@ -198,10 +218,11 @@ void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
       const std::size_t offset = (r * m.channels.size() + c) * window;
       const FitError error = ErrorOf(
           {&data.rd[offset], window}, {&data.valid[offset], window}, values, floor);
-      fits[r].error += error;
-      fits[r].worst_channel = std::max(fits[r].worst_channel, error.RelativeL2());
+      fit.error += error;
+      fit.worst_channel = std::max(fit.worst_channel, error.RelativeL2());
     }
   });
+  Join(job.options.ranks, fits);
   Summarize(
       job, fits, [&](std::size_t n) { return job.check.rows[n]; }, m, summary);
   summary.worst_total = all.worst_total;
@@ -215,14 +236,18 @@ void Measure(Job& job, Material& m, FactorSummary& summary) {
     MeasureCheck(job, m, summary);
     return;
   }
-  const std::int64_t points = m.PointCount();
+  SliceSource& source = job.distinct != nullptr ? *job.distinct : job.source;
+  const EqualRows* equal = job.distinct != nullptr ? &job.distinct->rows() : nullptr;
+  const auto point_of = [&](std::int64_t row) {
+    return equal != nullptr ? equal->first[static_cast<std::size_t>(row)] : row;
+  };
+  const std::int64_t points = source.header().PointCount();
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const double floor = reconstruct::kLogFloor * job.Peak();
   std::vector<SliceFit> fits(static_cast<std::size_t>(points));
   for (std::int64_t first = 0; first < points; first += kBlockRows) {
     Report(job.progress, {"factor", first, points, "errors"});
-    const SliceBlock block =
-        job.source.Read(first, std::min(kBlockRows, points - first));
+    const SliceBlock block = source.Read(first, std::min(kBlockRows, points - first));
     ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
       SliceFit& fit = fits[static_cast<std::size_t>(first + row)];
       std::vector<float> values(window);
@@ -231,20 +256,30 @@ void Measure(Job& job, Material& m, FactorSummary& summary) {
             (static_cast<std::size_t>(row) * m.channels.size() + c) * window;
         const std::span rd(block.rd + offset, window);
         const std::span valid(block.valid + offset, window);
-        ScaleSlice(rd, valid, first + row, c, m, values);
+        ScaleSlice(rd, valid, point_of(first + row), c, m, values);
         const FitError error = ErrorOf(rd, valid, values, floor);
         fit.error += error;
         fit.worst_channel = std::max(fit.worst_channel, error.RelativeL2());
         AddTotal(error.signal, error.model, fit);
       }
+      if (block.weight != nullptr) {
+        fit.slices = block.weight[row];
+        fit.error.Repeat(fit.slices);
+        fit.unfit *= fit.slices;
+      }
     });
   }
   Report(job.progress, {"factor", points, points, "done"});
-  ++job.passes;
+  if (equal != nullptr) {
+    CopyFromFirst(*equal, m.row_scale);
+    CopyFromFirst(*equal, m.albedo);
+  } else {
+    ++job.passes;
+  }
   Summarize(
       job,
       fits,
-      [](std::size_t n) { return static_cast<std::int64_t>(n); },
+      [&](std::size_t n) { return point_of(static_cast<std::int64_t>(n)); },
       m,
       summary);
 }

@@ -2,7 +2,10 @@
 
 #include "core/random.h"
 #include "factor/internal/block_svd.h"
+#include "factor/internal/equal_rows.h"
 #include "factor/internal/log_svd.h"
+#include "factor/internal/reuse.h"
+#include "reconstruct/clustering.h"
 
 #include <algorithm>
 #include <cmath>
@@ -65,10 +68,9 @@ bool OneReadingMayDo(const reconstruct::RdHeader& header,
   if (options.method == "reciprocal") {
     return header.PointCount() >= 2 * kSvdSampleRows && options.check_slices > 0;
   }
-  const bool is_svd = options.method == "log-svd" || options.method == "svd" ||
-                      options.method == "sqrt-svd";
-  return is_svd && options.clusters == 1 && options.check_slices > 0 &&
-         !options.one_by_one && BlocksPay(header, options.terms);
+  return IsSvd(options.method) && options.clusters == 1 && options.check_slices > 0 &&
+         !options.one_by_one && !options.divide_falloff &&
+         BlocksPay(header, options.terms);
 }
 
 bool IsComplete(const reconstruct::RdDataset& dataset) {
@@ -82,18 +84,26 @@ bool IsComplete(const reconstruct::RdDataset& dataset) {
 
 }  // namespace
 
+bool IsSvd(const std::string& method) {
+  return method == "log-svd" || method == "svd" || method == "sqrt-svd";
+}
+
 void LookAtAll(Job& job) {
   job.source.Know(nullptr, nullptr);
   job.check = {};
   job.totals.clear();
   job.sample = TakeSample(job.source, job.options.sample_rows, job.options.seed);
+  if (job.distinct != nullptr) {
+    job.scans = Scan(*job.distinct, job.options.thread_count);
+    return;
+  }
   job.scans = Scan(job.source, job.options.thread_count);
   ++job.passes;
 }
 
 void Look(Job& job) {
   const reconstruct::RdHeader& header = job.source.header();
-  if (OneReadingMayDo(header, job.options)) {
+  if (job.distinct == nullptr && OneReadingMayDo(header, job.options)) {
     job.check = TakeSample(job.source,
                            std::max(kSvdSampleRows, job.options.check_slices),
                            job.options.seed);
@@ -108,6 +118,21 @@ void Look(Job& job) {
     }
   }
   LookAtAll(job);
+}
+
+reconstruct::Clustering ClusterSlices(Job& job) {
+  if (KeepsClusters(job)) {
+    reconstruct::Clustering clustering;
+    clustering.labels = job.made->cluster;
+    clustering.cluster_count = job.made->cluster_count;
+    return clustering;
+  }
+  ++job.passes;
+  return job.clusterer({.clusters = job.options.clusters,
+                        .seed = job.options.seed,
+                        .thread_count = job.options.thread_count,
+                        .ranks = job.options.ranks},
+                       job.progress);
 }
 
 Job::~Job() {

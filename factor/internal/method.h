@@ -3,11 +3,15 @@
 #include "factor/factor.h"
 #include "factor/internal/mean_slice.h"
 #include "factor/internal/slice_source.h"
-#include "reconstruct/clustering.h"
 
 #include <functional>
 #include <memory>
 #include <vector>
+
+namespace nacre::reconstruct {
+struct ClusterOptions;
+struct Clustering;
+}  // namespace nacre::reconstruct
 
 namespace nacre::factor::internal {
 
@@ -24,6 +28,8 @@ Sample TakeSample(SliceSource& source, int wanted, std::uint64_t seed);
 using Clusterer = std::function<reconstruct::Clustering(
     const reconstruct::ClusterOptions&, const ProgressFunction&)>;
 
+class DistinctRows;
+
 /// What a method works on and with.
 struct Job {
   SliceSource& source;
@@ -39,10 +45,18 @@ struct Job {
   Sample check = {};
   std::vector<double> totals = {};  ///< [channel][point] Σ R_d of the slices
 
+  /// Where many slices are equal: each of them once; else null.
+  DistinctRows* distinct = nullptr;
+
+  /// A material of the same data and method to begin with (reuse.h); else null.
+  const Material* made = nullptr;
+
   ~Job();
   /// The largest measurement of any channel, mm⁻².
   double Peak() const;
 };
+
+bool IsSvd(const std::string& method);
 
 /// Fills `sample` and `scans`, or, where a method can do with one reading of all slices
 /// (the SVDs, large data, nothing missing), `sample`, `check` and its scans.
@@ -50,6 +64,10 @@ void Look(Job& job);
 
 /// Fills `sample` and `scans` by a reading of all slices; `check` is empty.
 void LookAtAll(Job& job);
+
+/// Clusters of the slices: those of `job.made` where they are the same, else by a
+/// reading.
+reconstruct::Clustering ClusterSlices(Job& job);
 
 /// A way to make maps and kernels of a dataset.
 class Method {

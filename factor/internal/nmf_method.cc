@@ -8,10 +8,12 @@
 #include "core/parallel.h"
 #include "factor/internal/hals.h"
 #include "factor/internal/method.h"
-#include "reconstruct/error_figures.h"
+#include "factor/internal/reuse.h"
+#include "reconstruct/clustering.h"
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace nacre::factor::internal {
 namespace {
@@ -28,14 +30,9 @@ class NmfMethod final : public Method {
         window_(job.source.header().WindowSize()),
         cluster_(static_cast<std::size_t>(job.source.header().PointCount()), 0) {
     if (job.options.clusters > 1) {
-      reconstruct::Clustering clustering =
-          job.clusterer({.clusters = job.options.clusters,
-                         .seed = job.options.seed,
-                         .thread_count = job.options.thread_count},
-                        job.progress);
+      reconstruct::Clustering clustering = ClusterSlices(job);
       cluster_ = std::move(clustering.labels);
       clusters_ = clustering.cluster_count;
-      ++job.passes;
     }
     for (const ChannelScan& scan : job.scans) {
       root_weight_.push_back(RootWeight(scan));
@@ -56,19 +53,25 @@ class NmfMethod final : public Method {
 
   Material Make(int terms) override {
     std::vector<RowMatrix> h(Matrices());
+    std::vector<int> rounds(Matrices(), 0);
     ParallelFor(std::ssize(h), job_.options.thread_count, [&](std::int64_t n) {
       const auto [channel, k] = Matrix(n);
-      h[static_cast<std::size_t>(n)] =
-          FactorNonnegative(SampleRows(channel, k), terms, kRounds, job_.options.seed)
-              .h;
+      Nonnegative found = FactorNonnegative(SampleRows(channel, k),
+                                            MadeKernels(channel, k),
+                                            terms,
+                                            kRounds,
+                                            job_.options.seed);
+      h[static_cast<std::size_t>(n)] = std::move(found.h);
+      rounds[static_cast<std::size_t>(n)] = found.rounds;
     });
+    rounds_ += std::accumulate(rounds.begin(), rounds.end(), 0);
     if (std::ssize(sample_.rows) < job_.source.header().PointCount()) {
       Refine(h);
     }
     return Store(h, terms);
   }
 
-  void Describe(FactorSummary&) const override {}
+  void Describe(FactorSummary& summary) const override { summary.rounds = rounds_; }
 
  private:
   struct Channel {
@@ -83,18 +86,34 @@ class NmfMethod final : public Method {
     return {static_cast<std::size_t>(n / clusters_), static_cast<int>(n % clusters_)};
   }
 
-  // G^(−q/2), G being the mean slice, but no less than what noise comes to.
+  // G^(−q/2).
   Eigen::VectorXd RootWeight(const ChannelScan& scan) const {
     const double largest = *std::max_element(scan.mean.begin(), scan.mean.end());
     const double scale = largest > 0 ? largest : 1;
-    const double least = std::max(-scan.least / scale, reconstruct::kLogFloor);
+    const std::vector<double> falloff = MeanFalloff(scan);
     Eigen::VectorXd weight(window_);
     for (Eigen::Index cell = 0; cell < window_; ++cell) {
-      const double g = scan.mean[static_cast<std::size_t>(cell)] / scale;
-      weight(cell) =
-          std::pow(std::max(g, least), -0.5 * job_.options.tail_weight) / scale;
+      weight(cell) = std::pow(falloff[static_cast<std::size_t>(cell)],
+                              -0.5 * job_.options.tail_weight) /
+                     scale;
     }
     return weight;
+  }
+
+  // What kernels begin with: those of a material of the same clusters, or none.
+  RowMatrix MadeKernels(std::size_t channel, int cluster) const {
+    const Material* made = job_.made;
+    if (!KeepsMaps(job_)) {
+      return RowMatrix(0, window_);
+    }
+    RowMatrix kernels(made->terms, window_);
+    for (int j = 0; j < made->terms; ++j) {
+      kernels.row(j) = Eigen::Map<const Eigen::RowVectorXf>(
+                           made->Kernel(static_cast<int>(channel), cluster, j), window_)
+                           .cast<double>()
+                           .cwiseProduct(root_weight_[channel].transpose());
+    }
+    return kernels;
   }
 
   // A row of the matrix; returns the number of cells that were filled.
@@ -297,6 +316,7 @@ class NmfMethod final : public Method {
   std::vector<std::uint8_t> cluster_;
   int clusters_ = 1;
   int most_ = 1;
+  int rounds_ = 0;
   Sample sample_;
   std::vector<Eigen::VectorXd> root_weight_;  // [channel]
 };

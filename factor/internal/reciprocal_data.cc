@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "factor/internal/reciprocal_sides.h"
+#include "factor/internal/reuse.h"
 
 #include <algorithm>
 #include <cmath>
@@ -359,9 +360,11 @@ ReciprocalData ReadReciprocal(Job& job,
     return data;
   }
   SetMeans(job, sums, data);
-  StartingMaps maps(job, data, limits.terms);
-  ForBlocks(job, "starting maps", [&](const SliceBlock& block) { maps.Add(block); });
-  start = maps.Finish();
+  if (!KeepsMaps(job)) {
+    StartingMaps maps(job, data, limits.terms);
+    ForBlocks(job, "starting maps", [&](const SliceBlock& block) { maps.Add(block); });
+    start = maps.Finish();
+  }
   return data;
 }
 

@@ -103,7 +103,7 @@ double ReciprocalBytes(const reconstruct::RdHeader& header,
 
 /// Reads a dataset as pairs, in one pass. Where the job has slices that stand for all,
 /// `start` comes of the same pass, and so do the job's totals, unless something wasn't
-/// measured.
+/// measured. `start` may stay empty where the job's material has all maps.
 ReciprocalData ReadReciprocal(Job& job,
                               const ReciprocalLimits& limits,
                               SharedMaps& start);

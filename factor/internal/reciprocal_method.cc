@@ -6,6 +6,7 @@
 #include "factor/internal/reciprocal_rest.h"
 #include "factor/internal/reciprocal_sides.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "factor/internal/reuse.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -16,7 +17,9 @@ namespace {
 class ReciprocalMethod final : public Method {
  public:
   explicit ReciprocalMethod(Job& job)
-      : job_(job), data_(ReadReciprocal(job, LimitsOf(job.options), start_)) {}
+      : job_(job), data_(ReadReciprocal(job, LimitsOf(job.options), start_)) {
+    BeginWithMade(job, start_);
+  }
 
   int MostTerms() const override { return static_cast<int>(start_.rows()); }
 
@@ -26,6 +29,7 @@ class ReciprocalMethod final : public Method {
                                             job_.options.taps,
                                             job_.options.thread_count,
                                             job_.progress);
+    rounds_ += fit.rounds;
     const ReciprocalRest rest =
         job_.options.rest > 0
             ? FitRest(data_, fit, job_.options.rest, job_.options.thread_count)
@@ -49,6 +53,7 @@ class ReciprocalMethod final : public Method {
 
   void Describe(FactorSummary& summary) const override {
     summary.a = data_.scale;
+    summary.rounds = rounds_;
     if (job_.options.sides > 0 && data_.sides.size() == 0) {
       summary.notes.push_back(
           "the two directions of near pairs don't differ by a map's values: no side "
@@ -80,6 +85,7 @@ class ReciprocalMethod final : public Method {
   Job& job_;
   SharedMaps start_;  // before the data, with which it is read
   ReciprocalData data_;
+  int rounds_ = 0;
 };
 
 }  // namespace

@@ -6,13 +6,17 @@
 
 namespace nacre::factor::internal {
 
-void GramSum::AddPanel(const RowMatrix& y, Eigen::Index first, Eigen::Index count) {
+void GramSum::AddPanel(const RowMatrix& y,
+                       const Eigen::VectorXd& weight,
+                       Eigen::Index first,
+                       Eigen::Index count) {
   const Eigen::Index below = y.cols() - first;
+  const RowMatrix panel = weight.asDiagonal() * y.middleCols(first, count);
   gram.block(first, first, below, count).noalias() +=
-      y.rightCols(below).transpose() * y.middleCols(first, count);
-  column_sum.segment(first, count) += y.middleCols(first, count).colwise().sum();
+      y.rightCols(below).transpose() * panel;
+  column_sum.segment(first, count) += panel.colwise().sum();
   if (first == 0) {
-    rows += y.rows();
+    rows += static_cast<std::int64_t>(weight.sum());
   }
 }
 

@@ -17,10 +17,14 @@ struct GramSum {
   Eigen::VectorXd column_sum;
   std::int64_t rows = 0;
 
-  /// Adds the rows of `y` to columns [first, first + count) of the lower triangle.
+  /// Adds the rows of `y`, each as often as `weight` says (whole numbers), to columns
+  /// [first, first + count) of the lower triangle.
   /// Panels may be added at the same time; each sums blocks in the order it is given
   /// them, so the bits don't depend on the number of threads.
-  void AddPanel(const RowMatrix& y, Eigen::Index first, Eigen::Index count);
+  void AddPanel(const RowMatrix& y,
+                const Eigen::VectorXd& weight,
+                Eigen::Index first,
+                Eigen::Index count);
 };
 
 /// The leading right singular vectors of the rows of a channel (and cluster), with what

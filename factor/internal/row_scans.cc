@@ -1,5 +1,7 @@
 #include "factor/internal/row_scans.h"
 
+#include "factor/internal/block_pass.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -60,6 +62,21 @@ void RowScans::Add(std::size_t channel, std::int64_t point, std::span<const floa
   low[at] = scan.low;
   high[at] = scan.high;
   total[at] = scan.total;
+}
+
+void RowScans::Join(const Ranks* ranks) {
+  if (ranks == nullptr) {
+    return;
+  }
+  const auto count = static_cast<std::size_t>(points);
+  for (std::size_t begin = 0; begin < low.size(); begin += count) {
+    JoinPassRows(points, 1, ranks, std::span<float>(low).subspan(begin, count));
+    JoinPassRows(points, 1, ranks, std::span<float>(high).subspan(begin, count));
+    JoinPassRows(points, 1, ranks, std::span<double>(total).subspan(begin, count));
+  }
+  std::int64_t missing[] = {has_missing ? 1 : 0};
+  ranks->Sum(missing);
+  has_missing = missing[0] > 0;
 }
 
 bool RowScans::AreRegular(std::size_t channel, double least) const {

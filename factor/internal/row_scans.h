@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/ranks.h"
 #include "factor/internal/mean_slice.h"
 
 #include <atomic>
@@ -16,6 +17,9 @@ struct RowScans {
 
   /// From any thread, each row once a pass.
   void Add(std::size_t channel, std::int64_t point, std::span<const float> rd);
+
+  /// Collective: rows that other ranks' parts of a pass saw are here too.
+  void Join(const Ranks* ranks);
 
   /// Whether all values seen are finite and above `least`, and none was missing.
   bool AreRegular(std::size_t channel, double least) const;

@@ -14,7 +14,8 @@ struct SliceBlock {
   std::int64_t count = 0;
   const float* rd = nullptr;
   const std::uint8_t* valid = nullptr;
-  const float* sigma = nullptr;  ///< 0 where unknown; null: unknown
+  const float* sigma = nullptr;          ///< 0 where unknown; null: unknown
+  const std::int64_t* weight = nullptr;  ///< slices that each stands for; null: one
 };
 
 /// A dataset read front to back as often as needed, a block at a time.

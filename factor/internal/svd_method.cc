@@ -1,10 +1,13 @@
 // The thesis' model and its linear special case.
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "factor/internal/log_svd.h"
 #include "factor/internal/method.h"
 #include "factor/internal/projection.h"
+#include "factor/internal/reuse.h"
 #include "factor/internal/transform_search.h"
+#include "reconstruct/clustering.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -37,17 +40,17 @@ class SvdMethod final : public Method {
  public:
   explicit SvdMethod(Job& job) : job_(job) {
     model_.scans = job.scans;
+    for (ChannelScan& scan : model_.scans) {
+      if (job.options.divide_falloff) {
+        scan.falloff = MeanFalloff(scan);
+      }
+    }
     model_.cluster.assign(static_cast<std::size_t>(job.source.header().PointCount()),
                           0);
     if (job.options.clusters > 1) {
-      reconstruct::Clustering clustering =
-          job.clusterer({.clusters = job.options.clusters,
-                         .seed = job.options.seed,
-                         .thread_count = job.options.thread_count},
-                        job.progress);
+      reconstruct::Clustering clustering = ClusterSlices(job);
       model_.cluster = std::move(clustering.labels);
       model_.cluster_count = clustering.cluster_count;
-      ++job.passes;
     }
     if (job.check.rows.empty() || !FitInOneReading()) {
       Fit(nullptr);
@@ -96,6 +99,7 @@ class SvdMethod final : public Method {
             .one_by_one = job_.options.one_by_one,
             .seed = job_.options.seed,
             .thread_count = job_.options.thread_count,
+            .ranks = job_.options.ranks,
             .sample = rows != nullptr ? &job_.check : nullptr,
             .rows = rows},
            model_,
@@ -150,6 +154,11 @@ class SvdMethod final : public Method {
                   if (!is_log || !(scale > 0)) {
                     return;
                   }
+                  if (job_.made != nullptr && KeepsTransforms(job_)) {
+                    model_.transforms[c].a = job_.made->a[c];
+                    model_.transforms[c].b = job_.made->b[c];
+                    return;
+                  }
                   const auto choice =
                       ChooseTransform(FilledRows(job_.sample.dataset, c, scan),
                                       {.terms = job_.options.terms,
@@ -173,6 +182,11 @@ class SvdMethod final : public Method {
 }  // namespace
 
 std::unique_ptr<Method> MakeSvdMethod(Job& job) {
+  if (job.options.divide_falloff && job.options.method == "log-svd") {
+    throw UsageError(
+        "option divide_falloff: the logarithm's kernels can't take the mean fall-off "
+        "back in; it is for the methods svd and sqrt-svd (nmf divides by it anyway)");
+  }
   return std::make_unique<SvdMethod>(job);
 }
 

@@ -1,5 +1,6 @@
 #include "factor/internal/terms_search.h"
 
+#include "factor/internal/kept_terms.h"
 #include "factor/internal/measure.h"
 #include "factor/internal/quantize.h"
 #include "factor/internal/reciprocal_totals.h"
@@ -22,6 +23,10 @@ class TermsSearch {
     }
     Factorization made{method_.Make(terms), {}};
     const Quantization rounding = Quantize(job_, job_.options.bits, made.material);
+    if (const int idle = DropIdleTerms(made.material); idle > 0) {
+      made.summary.notes.push_back(fmt::format(
+          "rounding leaves nothing of {} of {} terms: they are left out", idle, terms));
+    }
     if (made.material.form == Form::kReciprocal && job_.options.totals < 1) {
       BalanceTotals(job_, job_.options.totals, made.material);
     }

@@ -128,9 +128,10 @@ class TuckerMethod final : public Method {
         const Row row = MakeRow(Channels(block, r));
         y.row(r) = row.shifted.transpose();
       });
+      const Eigen::VectorXd weight = Eigen::VectorXd::Ones(block.count);
       ParallelFor(panels, job_.options.thread_count, [&](std::int64_t panel) {
         const Eigen::Index column = panel * kPanelColumns;
-        sum.AddPanel(y, column, std::min(kPanelColumns, window_ - column));
+        sum.AddPanel(y, weight, column, std::min(kPanelColumns, window_ - column));
       });
     }
     ++job_.passes;

@@ -1,18 +1,22 @@
 // Large data read once: what is told of all rows beside the fit, errors on some of
 // them, and data for which that doesn't do.
 
+#include "core/atomic_file.h"
 #include "core/error.h"
 #include "factor/factor.h"
 #include "factor/internal/row_scans.h"
 #include "factor/internal/window_totals.h"
+#include "factor/material_file.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
+#include "tests/support/thread_ranks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <limits>
 #include <numeric>
 
@@ -38,6 +42,28 @@ FactorOptions Options(const char* method) {
 
 double TotalOf(const std::vector<float>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
+}
+
+TEST(OneReading, GivesTheSameMaterialOnAnyNumberOfRanks) {
+  const nacre::testing::TempFolder folder;
+  for (const char* method : {"log-svd", "sqrt-svd"}) {
+    const Factorization alone = Factor(Large(), Options(method));
+    EXPECT_EQ(alone.summary.passes, 1);
+    WriteMaterial(folder / "alone.nacre.exr", alone.material);
+    for (const int size : {2, 3}) {
+      nacre::testing::OnThreadRanks(size, [&](const Ranks& ranks) {
+        FactorOptions options = Options(method);
+        options.thread_count = 1;
+        options.ranks = &ranks;
+        const Factorization shared = Factor(Large(), options);
+        const auto file = folder / fmt::format("{}.nacre.exr", ranks.rank());
+        WriteMaterial(file, shared.material);
+        EXPECT_TRUE(ReadFile(file) == ReadFile(folder / "alone.nacre.exr"));
+        EXPECT_EQ(shared.summary.worst_total, alone.summary.worst_total);
+        EXPECT_EQ(shared.summary.relative_l2, alone.summary.relative_l2);
+      });
+    }
+  }
 }
 
 TEST(RowScans, AreThoseOfASlowLoop) {

@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/exr.h"
 #include "factor/factor.h"
+#include "factor/internal/kept_terms.h"
 #include "factor/internal/material_codes.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
@@ -10,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 
 namespace nacre::factor {
@@ -52,6 +54,39 @@ TEST(Quantize, FewerBitsAreASmallerFileAndMoreError) {
     before = now;
   }
   EXPECT_GT(before.added_l2, 0.1);
+}
+
+// What changes no pixel isn't stored.
+TEST(Quantize, TermsThatRoundingLeavesNothingOfAreLeftOut) {
+  const auto [m, summary] = Factor(MakeChessboard({.points_x = 16, .points_y = 14}),
+                                   {.method = "svd", .terms = 10, .bits = 4});
+  EXPECT_LT(summary.terms, 10);
+  EXPECT_EQ(summary.terms, m.terms);
+  EXPECT_THAT(summary.notes, ::testing::Contains(HasSubstr("rounding leaves nothing")));
+  Validate(m, "after rounding");
+
+  Material idle = nacre::testing::MakeMaterial(3);
+  const auto map = static_cast<std::size_t>(idle.MapSize());
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::fill_n(&idle.f[2 * c * map], map, 0.0F);  // the first of two terms
+  }
+  Material kept = idle;
+  EXPECT_EQ(internal::DropIdleTerms(kept), 0);  // the first stays
+  for (std::size_t c = 0; c < 3; ++c) {
+    std::swap_ranges(
+        &kept.f[2 * c * map], &kept.f[(2 * c + 1) * map], &kept.f[(2 * c + 1) * map]);
+  }
+  idle = kept;
+  EXPECT_EQ(internal::DropIdleTerms(kept), 1);
+  EXPECT_EQ(kept.terms, 1);
+  Validate(kept, "without the idle term");
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float> with(9);
+    std::vector<float> without(9);
+    idle.EvaluateWindow(c, 2, 1, with.data());
+    kept.EvaluateWindow(c, 2, 1, without.data());
+    EXPECT_EQ(with, without);
+  }
 }
 
 TEST(Quantize, NeverMakesTheFileLarger) {
