@@ -187,6 +187,25 @@ Json InspectCalibration(const std::filesystem::path& path) {
 #endif
 }
 
+#ifdef NACRE_HAS_PRESETS
+
+// A preset is its material and what was said of it.
+Json PresetProvenance(const preset::Preset& p) {
+  const Json material = InspectMaterial(p.File("material")).at("provenance");
+  Json options{{"name", p.name},
+               {"title", p.title},
+               {"author", p.author},
+               {"licence", p.licence},
+               {"notes", p.notes}};
+  return {{"software", "nacre"},
+          {"version", material.is_object() ? material.value("version", "") : ""},
+          {"command", "preset make"},
+          {"options", std::move(options)},
+          {"inputs", Json::array({{{"material", material}}})}};
+}
+
+#endif
+
 Json InspectPreset(const std::filesystem::path& path) {
 #ifdef NACRE_HAS_PRESETS
   const preset::Preset p = preset::ReadPreset(path);
@@ -205,7 +224,7 @@ Json InspectPreset(const std::filesystem::path& path) {
           {"error", p.error},
           {"bytes", p.Bytes()},
           {"checksums", "verified"},
-          {"provenance", InspectMaterial(p.File("material")).at("provenance")}};
+          {"provenance", PresetProvenance(p)}};
 #else
   throw UsageError(path.string() +
                    ": is a preset, and this build was made without `render`");

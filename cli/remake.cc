@@ -135,8 +135,9 @@ class Remaker {
         names.emplace_back("dataset.rd.exr");
         Add(input.at("dataset"), names.back());
       } else if (input.contains("material")) {
-        names.push_back(fmt::format("made-{}.nacre.exr", ++made_count_));
-        Add(input.at("material"), std::string(names.back()));
+        const std::string made = fmt::format("made-{}.nacre.exr", ++made_count_);
+        names.push_back(made);
+        Add(input.at("material"), made);
       } else if (input.contains("calibration")) {
         names.emplace_back(kCalibration);
         Add(input.at("calibration"), names.back());

@@ -165,6 +165,50 @@ TEST_F(RunTest, ProvenanceRemakesTheFileToTheBit) {
   }
 }
 
+// What came from elsewhere, and a preset, which is a folder.
+TEST(Remake, ImportsAndPresetsToo) {
+  const testing::TempFolder folder;
+  std::string header =
+      "{'descr': '<f4', 'fortran_order': False, 'shape': (1, 2, 1, 1), }";
+  header.resize(117, ' ');
+  std::string npy = std::string("\x93NUMPY\x01\x00\x76\x00", 10) + header + "\n";
+  npy += std::string("\0\0\0\x3e\0\0\x80\x3d", 8);  // 0.125, 0.0625
+  WriteFile(folder / "scan.npy", npy);
+  RunJson({"import",
+           folder / "scan.npy",
+           "--from",
+           "npy",
+           "--pitch-mm",
+           "2",
+           "--out",
+           folder / "a.rd.exr"});
+  const Json commands =
+      RunJson({"inspect", folder / "a.rd.exr", "--provenance"}).at("commands");
+  std::vector<std::string> words = cli::SplitWords(commands.back());
+  EXPECT_THAT(words, ::testing::IsSupersetOf({"import", "scan.npy", "--from", "npy"}));
+  words.erase(words.begin());
+  for (std::string& word : words) {
+    if (word == "scan.npy" || word == "a.rd.exr") {
+      word = (folder / (word == "scan.npy" ? word : "b.rd.exr")).string();
+    }
+  }
+  RunJson(words);
+  EXPECT_EQ(ReadFile(folder / "a.rd.exr"), ReadFile(folder / "b.rd.exr"));
+
+  const Json made{{"command", "factor"},
+                  {"options", {{"terms", 2}}},
+                  {"inputs", Json::array({{{"dataset", Json()}}})}};
+  const Json preset{{"command", "preset make"},
+                    {"options", {{"name", "one"}, {"title", "One of them"}}},
+                    {"inputs", Json::array({{{"material", made}}})}};
+  EXPECT_THAT(
+      cli::CommandsThatRemake(preset, "one"),
+      ElementsAre("# dataset.rd.exr: nothing is known of how it was made",
+                  "nacre factor dataset.rd.exr --terms 2 --out made-1.nacre.exr",
+                  "nacre preset make made-1.nacre.exr --name one --title 'One of them' "
+                  "--out ."));
+}
+
 TEST_F(RunTest, SaysWhatIsWrongWithAProject) {
   EXPECT_THAT(Message(""), HasSubstr("no [[stage]]"));
   EXPECT_THAT(Message("[[stage]]\nrun = \"simulate marble.toml\""),

@@ -169,14 +169,15 @@ class Line:
         shutil.copytree(self.folder, folder, copy_function=os.link)
         return folder
 
-    def run(self, arguments, folder, environment=None, preexec=None, timeout=120):
+    def run(self, arguments, folder, environment=None, preexec=None, timeout=120, threads=1, nacre=None):
         variables = dict(os.environ)
         variables.pop("NACRE_FAULT", None)
         # With more it doesn't load in little memory, and sums in another order.
         variables["OPENBLAS_NUM_THREADS"] = "1"
         variables.update(environment or {})
         return subprocess.run(
-            [self.nacre, *arguments] + ([] if arguments == ["--version"] else ["--threads", "1"]),
+            [nacre or self.nacre, *arguments]
+            + ([] if arguments == ["--version"] else ["--threads", str(threads)]),
             cwd=folder,
             env=variables,
             capture_output=True,
