@@ -114,6 +114,7 @@ void Exitances::Illuminate(std::uint32_t shape,
                        .max_points = static_cast<std::int64_t>(options.max_lit_points),
                        .seed = options.seed,
                        .thread_count = options.thread_count,
+                       .ranks = options.ranks,
                        .indirect = settings_.kind == IntegratorSettings::Kind::kPath,
                        .seen = seen_[shape].get()});
   summary.irradiance_s += irradiance_time.Seconds();

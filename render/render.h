@@ -12,6 +12,11 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
+
+namespace nacre {
+class Ranks;
+}
 
 namespace nacre::render {
 
@@ -30,6 +35,9 @@ struct RenderOptions {
   double exitance_spacing = 1;
   bool lazy = true;
   double snapshot_s = 0;
+  /// Among whom the work is shared; null: nobody. All ranks call Render with the same
+  /// scene and options; the picture is the root's, others get a black one.
+  const Ranks* ranks = nullptr;
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
@@ -101,6 +109,7 @@ struct RenderSummary {
   int samples_resumed = 0;  ///< of the average, from a checkpoint
   int thread_count_used = 0;
   bool time_ran_out = false;
+  std::vector<std::string> ranks_lost;  ///< what stopped them; others did their work
   double relative_error = 0;  ///< of the luminance, as Accumulator estimates it
   std::int64_t triangles = 0;
   std::int64_t lights = 0;
@@ -140,10 +149,11 @@ struct Rendering {
 /// Called between passes with the picture so far.
 using SnapshotFunction = std::function<void(const ExrPart&)>;
 
-/// The same scene, options and seed give the same bits for any number of threads
-/// (unless a time limit cuts the work short), and whether or not the work was
+/// The same scene, options and seed give the same bits for any number of threads and
+/// ranks (unless a time limit cuts the work short), and whether or not the work was
 /// interrupted and taken up again: with a `checkpoint`, the samples are kept there from
-/// time to time and at the end, and those found there are gone on from.
+/// time to time, when `progress` asks to stop, and at the end, and those found there
+/// are gone on from.
 Rendering Render(const Scene& scene,
                  const RenderOptions& options = {},
                  const ProgressFunction& progress = {},

@@ -61,9 +61,15 @@ SCENE = """<scene version="0.6.0">
 
 SIMULATE = ["simulate", "phantom.toml", "--threads", "1", "--out", "o.rd.exr", "--solver"]
 RENDER = ["render", "ball.xml", "--threads", "1", "--out", "o.exr", "--max-lit-points", "3000", "--no-lazy"]
+DATA = "data.rd.exr"  # simulated before the rest
 
 # What is run under 2 ranks, under 4, and alone; and what it writes.
 COMMANDS = [
+    (["cluster", DATA, "--clusters", "3", "--threads", "1", "--out", "o.exr"], "o.exr"),
+    (["factor", DATA, "--method", "svd", "--terms", "2", "--clusters", "2", "--threads", "1",
+      "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
+    (["factor", DATA, "--method", "nmf", "--terms", "2", "--threads", "1",
+      "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
     (SIMULATE + ["fast"], "o.rd.exr"),
     (SIMULATE + ["mc", "--photons", "3000"], "o.rd.exr"),
     (SIMULATE + ["mc", "--beam", "1,0", "--error", "0.9"], "o.rd.exr"),
@@ -105,6 +111,8 @@ class Runner:
             print("FAILED:", what, flush=True)
 
     def same_bytes(self):
+        code, _, err = self.run(1, ["simulate", "phantom.toml", "--solver", "fast", "--out", DATA])
+        self.check(code == 0, f"simulate: {code} {err}")
         for arguments, written in COMMANDS:
             name = " ".join(arguments)
             made = {}
