@@ -84,6 +84,10 @@ def fit_traffic(rows, key):
 def fit(case):
     rows = case["rows"]
     columns = [[1.0] * len(rows), [r["size"] for r in rows], [r["size"] / r["ranks"] for r in rows]]
+    # Measured on one size, what is serial is one of the two.
+    for one, column in (("s0", 1), ("s1", 0)):
+        if case.get("serial") == one:
+            columns[column] = [0.0] * len(rows)
     (s0, s1, c), error = least_squares(columns, [r["busiest"] for r in rows])
     return {"s0": s0, "s1": s1, "c": c, "error": error,
             "messages": fit_traffic(rows, "messages"), "bytes": fit_traffic(rows, "bytes")}
