@@ -28,25 +28,6 @@ std::string Displays() {
   return text.empty() ? "none" : text;
 }
 
-// Of the process: nested calls are counted by SDL.
-class Video {
- public:
-  Video() {
-    // Ctrl-C belongs to the command; and the person types in another window.
-    SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
-    SDL_SetHint(SDL_HINT_VIDEO_MINIMIZE_ON_FOCUS_LOSS, "0");
-    if (SDL_InitSubSystem(SDL_INIT_VIDEO) != 0) {
-      throw Failure("there are no displays here");
-    }
-  }
-  ~Video() { SDL_QuitSubSystem(SDL_INIT_VIDEO); }
-  Video(const Video&) = delete;
-  Video& operator=(const Video&) = delete;
-};
-
-struct DestroyWindow {
-  void operator()(SDL_Window* window) const { SDL_DestroyWindow(window); }
-};
 struct FreeSurface {
   void operator()(SDL_Surface* surface) const { SDL_FreeSurface(surface); }
 };
@@ -54,6 +35,26 @@ struct FreeSurface {
 }  // namespace
 
 struct ProjectorWindow::Handles {
+  // Of the process: nested calls are counted by SDL.
+  class Video {
+   public:
+    Video() {
+      // Ctrl-C belongs to the command; and the person types in another window.
+      SDL_SetHint(SDL_HINT_NO_SIGNAL_HANDLERS, "1");
+      SDL_SetHint(SDL_HINT_VIDEO_MINIMIZE_ON_FOCUS_LOSS, "0");
+      if (SDL_InitSubSystem(SDL_INIT_VIDEO) != 0) {
+        throw Failure("there are no displays here");
+      }
+    }
+    ~Video() { SDL_QuitSubSystem(SDL_INIT_VIDEO); }
+    Video(const Video&) = delete;
+    Video& operator=(const Video&) = delete;
+  };
+
+  struct DestroyWindow {
+    void operator()(SDL_Window* window) const { SDL_DestroyWindow(window); }
+  };
+
   Video video;
   std::unique_ptr<SDL_Window, DestroyWindow> window;
 };
