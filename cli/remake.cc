@@ -109,7 +109,7 @@ class Remaker {
     } else if (verb != kMesh) {
       line += " --out " + Quoted(name);
     }
-    lines_.push_back(line);
+    AddOnce(line);
   }
 
   Lines Take() && { return std::move(lines_); }
@@ -118,8 +118,12 @@ class Remaker {
   static constexpr const char* kCalibration = "calibration.json";
 
   void Need(const std::string& what, const Json& input) {
-    const std::string line =
-        fmt::format("# needs {} (xxh3 {})", what, input.value("xxh3", "not recorded"));
+    AddOnce(
+        fmt::format("# needs {} (xxh3 {})", what, input.value("xxh3", "not recorded")));
+  }
+
+  // A dataset is an input of a material and of the one that this begins with.
+  void AddOnce(const std::string& line) {
     if (std::find(lines_.begin(), lines_.end(), line) == lines_.end()) {
       lines_.push_back(line);
     }
