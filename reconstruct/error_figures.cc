@@ -36,7 +36,8 @@ double FindPeak(const SliceSource& a, const ProgressFunction& progress) {
     for (int i = 0; i < a.header.points_x; ++i) {
       const RdSlice slice = a.slice(i, j);
       for (std::size_t k = 0; k < slice.rd.size(); ++k) {
-        peak = slice.valid[k] != 0 ? std::max(peak, double{slice.rd[k]}) : peak;
+        peak = slice.valid[k] != 0 ? std::max(peak, static_cast<double>(slice.rd[k]))
+                                   : peak;
       }
     }
   }
@@ -103,8 +104,8 @@ class Comparison {
   Sums SumsOf(const RdSlice& a, const RdSlice& b, std::size_t begin, std::size_t end) {
     Sums sums;
     for (std::size_t k = begin; k < end; ++k) {
-      const double x{a.rd[k]};
-      const double y{b.rd[k]};
+      const auto x = static_cast<double>(a.rd[k]);
+      const auto y = static_cast<double>(b.rd[k]);
       sums.all_a += a.valid[k] != 0 ? x : 0;
       sums.all_b += b.valid[k] != 0 ? y : 0;
       if (a.valid[k] == 0 || b.valid[k] == 0) {

@@ -77,8 +77,8 @@ COMMANDS = [
     (RENDER + ["--reference", "--spp", "2"], "o.exr"),
 ]
 
-# A picture that takes a second or more, and shows itself after its first passes.
-LONG = ["render", "ball.xml", "--threads", "1", "--out", "long.exr", "-D", "size=128", "--spp", "64",
+# A picture that takes seconds (a kill takes half of one to be heard of), and shows itself after its first passes.
+LONG = ["render", "ball.xml", "--threads", "1", "--out", "long.exr", "-D", "size=128", "--spp", "384",
         "--sampling", "even", "--checkpoint", "half", "--snapshot", "0.02"]
 
 
