@@ -18,6 +18,8 @@ Json ParseJson(const std::string& text, const std::string& origin) {
                               origin,
                               1 + std::count(text.begin(), end, '\n'),
                               e.what()));
+  } catch (const Json::out_of_range& e) {  // a number that no double can hold
+    throw BadData(fmt::format("{}: not valid JSON: {}", origin, e.what()));
   }
 }
 

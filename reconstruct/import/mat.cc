@@ -68,12 +68,14 @@ void CheckWhole(const std::filesystem::path& path) {
         path.string() +
         ": isn't a MATLAB file of version 5 or 7.3; save it with -v7 or -v7.3");
   }
+  const bool big_endian = text.ends_with("MI");
+  const int major = text[big_endian ? 124 : 125];  // 1: version 5, 2: HDF5
   std::array<char, 8> beyond{};
   file.seekg(512);
   file.read(beyond.data(), beyond.size());
-  if (std::string_view(beyond.data(), beyond.size()) != kHdf5) {
+  if (major != 2 || std::string_view(beyond.data(), beyond.size()) != kHdf5) {
     file.clear();
-    CheckMatElements(file, text.ends_with("MI"), path.string());
+    CheckMatElements(file, big_endian, path.string());
   }
 }
 

@@ -89,6 +89,16 @@ TEST(Json, NamesTheLineOfAnError) {
   }
 }
 
+TEST(Json, ANumberBeyondAllDoublesIsBadData) {
+  try {
+    ParseJson("[1e999]", "x.json");
+    FAIL() << "expected an error";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::kBadData);
+    EXPECT_THAT(e.what(), HasSubstr("x.json: not valid JSON"));
+  }
+}
+
 TEST(Json, NamesTheFieldThatIsMissingOrWrong) {
   const Json json = ParseJson(R"({"a": "text"})", "x.json");
   EXPECT_EQ(Get<std::string>(json, "a", "x.json"), "text");
