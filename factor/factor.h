@@ -220,9 +220,10 @@ Factorization Factor(reconstruct::RdReader& reader,
 /// `bits` and what errors are measured on, its leading terms are taken and nothing is
 /// fitted: slices are read once, or, where all were measured and 8192 slices are
 /// there, `check_slices` of them. Else clusters are kept where their number and seed
-/// are, A and B where what they are chosen by is; nmf, bilinear and reciprocal begin
-/// with its kernels or maps. A note says what was taken. Where `made` holds rounded
-/// values, these are what is taken.
+/// are, A and B where what they are chosen by is; nmf begins with its kernels where
+/// there are as many terms, bilinear and reciprocal with its maps where there are no
+/// more. A note says what was taken. Where `made` holds rounded values, these are what
+/// is taken.
 ///
 /// Throws, beside the above, a usage Error for another method or one that nothing can
 /// be kept of (tucker, profiles, auto), BadData if `made` isn't of these data by its
