@@ -162,7 +162,7 @@ class PlyParser {
         ReadVertices(element);
       } else if (element.name == "face") {
         ReadFaces(element);
-      } else {
+      } else if (!element.properties.empty()) {  // else any count is of no bytes
         for (std::int64_t i = 0; i < element.count; ++i) {
           ReadRow(element, -1);
         }
