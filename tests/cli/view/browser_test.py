@@ -10,6 +10,7 @@ import tempfile
 import time
 
 from selenium import webdriver
+from selenium.common.exceptions import StaleElementReferenceException
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
@@ -66,8 +67,14 @@ class Page:
         check(self.process.wait(10) in (0, 75), "it ends when told to")
 
     def wait(self, condition, what):
+        def holds():
+            try:
+                return condition()
+            except StaleElementReferenceException:  # drawn anew between finding and asking
+                return False
+
         end = time.time() + 20
-        while not condition():
+        while not holds():
             if time.time() > end:
                 raise AssertionError("no %s; the page says '%s'" % (what, self.text("error")))
             time.sleep(0.05)
