@@ -18,6 +18,11 @@ constexpr int kMostSamplePasses = 16;
 // The sample's own basis is no nearer to that of all rows than a few thousandths.
 constexpr double kSampleTolerance = 1e-4;
 constexpr double kDependent = 1e-11;  // of U's columns: squared, so rounding of floats
+// Of U's columns: what is shorter than that of the longest is rounding of floats.
+constexpr double kLeastColumn = 1e-6;
+constexpr double kFloat = 6e-8;
+// Columns that are nearer to each other than that make more of rounding.
+constexpr double kOblique = 0.1;
 
 // The SVD of Y projected on the range of U.
 struct Ritz {
@@ -25,6 +30,8 @@ struct Ritz {
   Eigen::MatrixXd vectors;    // columns × rank
   Eigen::MatrixXd to_scores;  // scores = U · to_scores
   double excess = 0;
+  // U's columns had directions in common that floats don't tell from others.
+  bool is_cut = false;
 };
 
 // `basis` is what the product was made with.
@@ -34,7 +41,7 @@ Ritz RayleighRitz(const BlockProduct& product,
   Ritz ritz;
   // U's columns are nearly orthogonal but of very different length: scaled first.
   Eigen::VectorXd scale = product.gram.diagonal().cwiseMax(0).cwiseSqrt();
-  const double least = kRankTolerance * scale.maxCoeff();
+  const double least = kLeastColumn * scale.maxCoeff();
   for (double& length : scale) {
     length = length > least ? 1 / length : 0;
   }
@@ -48,9 +55,9 @@ Ritz RayleighRitz(const BlockProduct& product,
   if (rank == 0) {
     return {Eigen::VectorXd(0),
             Eigen::MatrixXd(product.z.rows(), 0),
-            Eigen::MatrixXd(scale.size(), 0),
-            0};
+            Eigen::MatrixXd(scale.size(), 0)};
   }
+  ritz.is_cut = first > (scale.array() == 0).count();
   // Q = U orthonormal, B = QᵀY.
   const Eigen::MatrixXd orthonormal =
       scale.asDiagonal() * angles.eigenvectors().rightCols(rank) *
@@ -73,21 +80,53 @@ Ritz RayleighRitz(const BlockProduct& product,
   // first singular value beyond the block to its own: that much of u_j is outside U's
   // range, and E = ‖Y − Ŷ‖² is above its least by Σ_j σ_j² times its square [Halko11,
   // sec. 9].
+  // Beyond the block is what its columns were too short for, if any were. And what
+  // rounding of floats in YᵀU comes to in QᵀY.
   const Eigen::Index wanted = std::min(terms, kept);
-  const double left = product.squares - ritz.sigma.head(wanted).squaredNorm();
-  if (kept == basis.cols() && left > 1e-12 * product.squares) {
-    const Eigen::MatrixXd leading = ritz.vectors.leftCols(wanted);
-    const double outside =
-        (leading - basis * (basis.transpose() * leading)).squaredNorm();
-    ritz.excess = 0.5 * std::pow(ritz.sigma(kept - 1), 2) * outside / left;
+  const double left = std::max(product.squares - ritz.sigma.head(wanted).squaredNorm(),
+                               1e-12 * product.squares);
+  const double beyond =
+      kept == basis.cols() ? ritz.sigma(kept - 1) : kLeastColumn * ritz.sigma(0);
+  const Eigen::MatrixXd leading = ritz.vectors.leftCols(wanted);
+  const double outside =
+      (leading - basis * (basis.transpose() * leading)).squaredNorm();
+  ritz.excess = 0.5 * beyond * beyond * outside / left;
+  const double oblique = angles.eigenvalues()(first);
+  if (oblique < kOblique) {
+    ritz.excess += std::pow(kFloat * ritz.sigma(0), 2) / oblique / left;
   }
   return ritz;
+}
+
+Eigen::MatrixXd DrawColumns(Eigen::Index rows, Eigen::Index columns) {
+  RandomStream random(1, 0x626C6F636B);
+  const auto draw = [&] { return random.Uniform() - 0.5; };
+  return Eigen::MatrixXd::NullaryExpr(rows, columns, draw);
+}
+
+Eigen::MatrixXd Orthonormal(const Eigen::MatrixXd& columns) {
+  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(columns);
+  return qr.householderQ() * Eigen::MatrixXd::Identity(columns.rows(), columns.cols());
 }
 
 // A basis of whole panels, the rest zero.
 Eigen::MatrixXd Padded(const Eigen::MatrixXd& vectors, Eigen::Index size) {
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(vectors.rows(), size);
   basis.leftCols(vectors.cols()) = vectors;
+  return basis;
+}
+
+// The rest drawn at random, orthogonal to the vectors: of what singular values fall by
+// more decades than floats have digits, one product shows the largest alone, and the
+// next, without them, what is below.
+Eigen::MatrixXd Filled(const Eigen::MatrixXd& vectors, Eigen::Index size) {
+  const Eigen::Index count = std::min(size, vectors.rows()) - vectors.cols();
+  Eigen::MatrixXd drawn = DrawColumns(vectors.rows(), count);
+  for (int twice = 0; twice < 2; ++twice) {
+    drawn -= vectors * (vectors.transpose() * drawn).eval();
+  }
+  Eigen::MatrixXd basis = Padded(vectors, size);
+  basis.middleCols(vectors.cols(), count) = Orthonormal(drawn);
   return basis;
 }
 
@@ -127,14 +166,9 @@ BlockSvd ToSvd(const BlockProduct& product, Ritz ritz, Eigen::Index terms) {
 void BlockSvdSolver::Start(const reconstruct::RdHeader& header) {
   const Eigen::Index columns = header.WindowSize();
   const Eigen::Index size = PaddedColumns(options_.terms + options_.spare);
-  RandomStream random(1, 0x626C6F636B);
-  const auto draw = [&] { return random.Uniform() - 0.5; };
   const Eigen::MatrixXd start =
-      Eigen::MatrixXd::NullaryExpr(columns, std::min(size, columns), draw);
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(start);
-  const Eigen::MatrixXd basis =
-      qr.householderQ() * Eigen::MatrixXd::Identity(columns, start.cols());
-  bases_.assign(channels_.size(), Padded(basis, size));
+      Orthonormal(DrawColumns(columns, std::min(size, columns)));
+  bases_.assign(channels_.size(), Padded(start, size));
 }
 
 void BlockSvdSolver::SolveSample(SliceSource& sample,
@@ -144,12 +178,14 @@ void BlockSvdSolver::SolveSample(SliceSource& sample,
     const std::vector<BlockProduct> products = RunBlockPass(
         sample, fill_, channels_, bases_, options_.workers, progress, "sample");
     double excess = 0;
+    bool is_cut = false;
     for (std::size_t n = 0; n < products.size(); ++n) {
       const Ritz ritz = RayleighRitz(products[n], bases_[n], options_.terms);
-      bases_[n] = Padded(ritz.vectors, size);
+      bases_[n] = ritz.is_cut ? Filled(ritz.vectors, size) : Padded(ritz.vectors, size);
       excess = std::max(excess, ritz.excess);
+      is_cut = is_cut || ritz.is_cut;
     }
-    if (excess <= kSampleTolerance) {
+    if (excess <= kSampleTolerance && !is_cut) {
       return;
     }
   }

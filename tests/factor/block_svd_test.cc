@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 namespace nacre::factor::internal {
@@ -199,6 +200,39 @@ TEST(BlockSvd, TwelveDecadesOfRows) {
   const double peak = static_cast<double>(Peak(data));
   ExpectAsGood(FitBoth(data, {false, peak, 1}, {.terms = 10}), 1e-5);
   ExpectAsGood(FitBoth(data, {true, 1e-3 * peak, 1}, {.terms = 10}), 1e-5);
+}
+
+// The tolerance, and 10⁻⁶ of the whole for floats. Singular values over twelve decades
+// were off by 10⁻³ of it.
+TEST(BlockSvd, WorstConditions) {
+  const auto expect = [](const Fits& fits) {
+    EXPECT_LE((fits.y - BlockModel(fits)).norm(),
+              (1 + 1e-5) * (fits.y - GramModel(fits)).norm() + 1e-6 * fits.y.norm());
+  };
+  RdDataset data = Chessboard();
+  const auto rows = static_cast<double>(data.header.PointCount());
+  const auto window = static_cast<std::size_t>(data.header.WindowSize());
+  for (const bool hilbert : {false, true}) {
+    for (std::size_t n = 0; n < data.rd.size(); ++n) {
+      const auto p = static_cast<double>(n / window);
+      const auto d = static_cast<double>(n % window);
+      double value = 1 / (0.01 * p + d + 1);
+      for (int j = 0; j < 13 && !hilbert; ++j) {
+        // Orthogonal rows and columns, singular values over twelve decades.
+        value = (j == 0 ? 0 : value) +
+                std::pow(10, -j) * std::cos(std::numbers::pi * j * (p + 0.5) / rows) *
+                    std::cos(std::numbers::pi * j * (d + 0.5) / 121);
+      }
+      data.rd[n] = static_cast<float>(value);
+    }
+    for (const int terms : {4, 10}) {
+      expect(FitBoth(data, {false, 1, 1}, {.terms = terms}));
+      expect(FitBoth(data, {true, 3, 1}, {.terms = terms}));
+      if (hilbert) {
+        expect(FitBoth(data, {true, 1e-6, 1}, {.terms = terms}));
+      }
+    }
+  }
 }
 
 TEST(BlockSvd, MissingHalvesAreCompletedAsByTheExactOne) {

@@ -99,6 +99,65 @@ TEST(TruncatedSvd, ZerosHaveNoTerms) {
   EXPECT_EQ(ComputeTruncatedSvd(RowMatrix::Zero(7, 5), 3).sigma.size(), 0);
 }
 
+// YᵀY of m rows is off by m u ‖Y‖² at most, its eigenvalues by as much (Weyl), by n u
+// ‖Y‖² of the dense solver or 10⁻¹³ ‖Y‖² of Lanczos': ε in all. So are the σ², and k
+// terms take at most 2 k ε ‖Y‖² more of ‖Y − Ŷ‖² than the best do, and leave out what
+// is below the tolerance for a rank. Wide matrices' basis is Yᵀu / σ: as much again
+// over σ, for each term.
+void ExpectBestOfItsRank(const RowMatrix& y, int terms) {
+  const TruncatedSvd svd = ComputeTruncatedSvd(y, terms);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> exact(y);
+  const Eigen::VectorXd& sigma = exact.singularValues();
+  const double squares = y.squaredNorm();
+  const double epsilon = static_cast<double>(y.rows() + y.cols()) * 0x1p-53 + 1e-13;
+  double best = sigma.tail(sigma.size() - terms).squaredNorm();
+  best += terms * (2 * epsilon + kRankTolerance * kRankTolerance) * squares;
+  double bound = std::sqrt(best);
+  for (Eigen::Index j = 0; j < svd.sigma.size(); ++j) {
+    EXPECT_LE(std::abs(std::pow(svd.sigma(j), 2) - std::pow(sigma(j), 2)),
+              epsilon * squares)
+        << j;
+    bound += y.rows() < y.cols() ? 2 * epsilon * squares / svd.sigma(j) : 0;
+  }
+  // No term is missing that the tolerance can't have hidden.
+  const double hidden = std::pow(kRankTolerance * sigma(0), 2) + 2 * epsilon * squares;
+  if (svd.sigma.size() < terms) {
+    EXPECT_LE(std::pow(sigma(svd.sigma.size()), 2), hidden);
+  }
+  EXPECT_LE((svd.scores * svd.basis.transpose() - y).norm(), bound);
+  EXPECT_TRUE(svd.scores.allFinite() && svd.basis.allFinite());
+}
+
+TEST(TruncatedSvd, WorstConditions) {
+  const double decade = std::pow(10, -12.0 / 24);  // 12 decades in 25 columns
+  for (const int terms : {3, 12, 25}) {
+    ExpectBestOfItsRank(Decaying(40, 25, decade, 17), terms);
+    ExpectBestOfItsRank(Decaying(25, 40, decade, 18), terms);
+  }
+  ExpectBestOfItsRank(Decaying(150, 130, 0.5, 19), 8);  // by Lanczos
+  ExpectBestOfItsRank(Decaying(130, 150, 0.5, 20), 8);
+  RowMatrix hilbert(40, 25);
+  RowMatrix graded = Decaying(40, 25, 0.9, 21);
+  RowMatrix twins = Decaying(40, 25, 0.9, 22);
+  for (Eigen::Index i = 0; i < 40; ++i) {
+    for (Eigen::Index j = 0; j < 25; ++j) {
+      hilbert(i, j) = 1 / static_cast<double>(i + j + 1);
+    }
+    graded.row(i) *= std::pow(10, -12.0 * static_cast<double>(i) / 39);
+    if (i % 2 == 1) {  // by turns the same row and one that is nearly so
+      twins.row(i) = twins.row(i - 1) * (i % 4 == 1 ? 1 : 1 + 1e-12);
+    }
+  }
+  for (const double scale : {1.0, 1e-30, 1e30}) {
+    for (const int terms : {2, 10}) {
+      ExpectBestOfItsRank(scale * hilbert, terms);
+      ExpectBestOfItsRank(scale * graded, terms);
+      ExpectBestOfItsRank(scale * twins, terms);
+      ExpectBestOfItsRank(scale * graded.transpose(), terms);
+    }
+  }
+}
+
 TEST(TruncatedSvd, SignsAreCanonical) {
   const RowMatrix y = Decaying(30, 20, 0.5, 11);
   const TruncatedSvd svd = ComputeTruncatedSvd(y, 4);
