@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "core/options_json.h"
 #include "core/provenance.h"
+#include "core/ranks.h"
 #include "factor/internal/auto_method.h"
 #include "factor/internal/bilinear_data.h"
 #include "factor/internal/equal_rows.h"
@@ -240,8 +241,10 @@ Factorization FactorBy(const Data& data,
     summary.notes.push_back(internal::NoteOnReuse(job));
   }
   AddNotes(options, data.header.PointCount(), method->MostTerms(), summary);
-  summary.invariants =
-      CheckInvariants(result.material, options.seed, options.thread_count);
+  if (options.ranks == nullptr || options.ranks->IsRoot()) {
+    summary.invariants =
+        CheckInvariants(result.material, options.seed, options.thread_count);
+  }
   if (const std::string note = summary.invariants.EnergyNote(); !note.empty()) {
     summary.notes.push_back(note);
   }
@@ -298,7 +301,8 @@ Factorization FactorData(Dataset& dataset,
 }  // namespace
 
 bool SharesWork(const std::string& method) {
-  return internal::IsSvd(method);
+  return internal::IsSvd(method) || method == "reciprocal" ||
+         method == internal::kAutoMethod;
 }
 
 const std::vector<std::string>& FactorMethods() {

@@ -42,7 +42,8 @@ struct FactorOptions {
   double memory_mb = 1000;
 
   int thread_count = 0;          ///< 0: all cores; doesn't change a bit of the result
-  const Ranks* ranks = nullptr;  ///< nor do these, if SharesWork(); all get the same
+  const Ranks* ranks = nullptr;  ///< nor do these, if SharesWork(); all get the same,
+                                 ///< the root alone the invariants
   std::uint64_t seed = 1;        ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>

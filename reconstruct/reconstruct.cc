@@ -279,8 +279,7 @@ ReconstructSummary Reconstruct(const acquire::SessionReader& session,
   }
   spool.Forget();
 
-  Separation separation(
-      header, session.schedule(), reader, spool, options.thread_count);
+  Separation separation(header, session.schedule(), reader, spool, options);
   if (options.subtract_crosstalk) {
     Report(progress, {"reconstruct", 0, header.points_y, "tails"});
     separation.FitTails();

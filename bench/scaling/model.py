@@ -6,7 +6,10 @@
             + messages(N, D) L + bytes(N, D) / B_net  of the busiest rank
 
 D is the size of the data. Messages and bytes are (a + b D) f(N), f the one of SHAPES that
-fits best what was counted.
+fits best what was counted; but messages of a queue of tiles as it hands them out, see handed().
+A case may say `most_ranks` that share its work, `most_size` of data beyond which what they
+share doesn't grow, and that sums go along a `chain` of ranks, each waiting for the one
+before.
 """
 
 import itertools
@@ -20,13 +23,25 @@ STORAGE = 10e9
 
 MANY = (8, 64, 512)
 FULL = 277**2 * 39**2 * 3  # values of the largest dataset there is, 1.4 GB
-PICTURE = 512**2 * 64  # samples
+SAMPLES = 64  # a pixel
+PICTURE = 512**2 * SAMPLES
+TILE = 8  # pixels along a side, render/sample_plan.h
 
 SHAPES = {
     "1 − 1/N": lambda n: 1 - 1 / n,  # everybody's share to the root
     "log₂ N": lambda n: math.ceil(math.log2(n)),  # sums along a tree
     "N − 1": lambda n: n - 1,  # the root with each
 }
+
+
+def handed(ranks, size):
+    """Of the tiles of a pass that other ranks get from the root (render/job_queue.cc): a
+    4 N-th of what is left at a time, while that is a tile or more. There are no more of
+    them than tiles."""
+    tiles = size / SAMPLES / TILE**2
+    parts = 4 * ranks
+    most = parts * (1 + math.log(max(1.0, tiles / parts)))
+    return 2 * min(tiles, most) * (1 - 1 / ranks)  # there and back
 
 
 def solve(matrix, right):
@@ -69,49 +84,63 @@ def least_squares(columns, right):
     return best
 
 
-def fit_traffic(rows, key):
-    shared = [row for row in rows if row["ranks"] > 1]
+def candidates(case, key):
+    """Forms of messages or bytes as functions of ranks and data, each with its terms."""
+    if key == "messages" and case.get("queue"):
+        return {"queue": [("handed(N, D)", handed), ("(N − 1)", lambda n, d: n - 1)]}
+    return {name: [(f"({name})", lambda n, d, f=f: f(n)),
+                   (f"D ({name})", lambda n, d, f=f: d * f(n))] for name, f in SHAPES.items()}
+
+
+def fit_traffic(case, key):
+    shared = [row for row in case["rows"] if row["ranks"] > 1]
     best = None
-    for name, shape in SHAPES.items():
-        columns = [[shape(r["ranks"]) for r in shared],
-                   [shape(r["ranks"]) * r["size"] for r in shared]]
-        (a, b), error = least_squares(columns, [r[key] for r in shared])
+    for terms in candidates(case, key).values():
+        columns = [[f(r["ranks"], r["size"]) for r in shared] for _, f in terms]
+        factors, error = least_squares(columns, [r[key] for r in shared])
         if best is None or error < best["error"] - 1e-3:
-            best = {"shape": name, "a": a, "b": b, "error": error}
+            best = {"terms": [(factor, *term) for factor, term in zip(factors, terms)],
+                    "error": error}
     return best
+
+
+def shared_size(case, ranks, size):
+    """What a rank has of the work that is shared."""
+    return min(size, case.get("most_size", size)) / min(ranks, case.get("most_ranks", ranks))
 
 
 def fit(case):
     rows = case["rows"]
-    columns = [[1.0] * len(rows), [r["size"] for r in rows], [r["size"] / r["ranks"] for r in rows]]
-    # Measured on one size, what is serial is one of the two.
-    for one, column in (("s0", 1), ("s1", 0)):
-        if case.get("serial") == one:
-            columns[column] = [0.0] * len(rows)
+    columns = [[1.0] * len(rows), [r["size"] for r in rows],
+               [shared_size(case, r["ranks"], r["size"]) for r in rows]]
     (s0, s1, c), error = least_squares(columns, [r["busiest"] for r in rows])
     return {"s0": s0, "s1": s1, "c": c, "error": error,
-            "messages": fit_traffic(rows, "messages"), "bytes": fit_traffic(rows, "bytes")}
+            "messages": fit_traffic(case, "messages"), "bytes": fit_traffic(case, "bytes")}
 
 
 def traffic(of, ranks, size):
-    return (of["a"] + of["b"] * size) * SHAPES[of["shape"]](ranks)
+    return sum(factor * f(ranks, size) for factor, _, f in of["terms"])
 
 
 def parts(case, of, ranks, size):
     """Seconds by what they go to."""
     largest = case["rows"][-1]
-    is_data = case["name"] != "render"
+    is_data = not case.get("queue")
     read = case["passes"] * size * case.get("read_bytes_a_value", 4)
     # Datasets grow with their rows; a material or a map of clusters too, but is small.
     written = largest["written"] * size / largest["size"]
-    shared = ranks > 1
+    moved = min(size, case.get("most_size", size))
+    hops = min(ranks, case["most_ranks"]) if case.get("chain") else 1
+    network = 0
+    if ranks > 1:
+        network = hops * (traffic(of["messages"], ranks, moved) * LATENCY_S
+                          + traffic(of["bytes"], ranks, moved) / NETWORK)
     return {
-        "compute": of["c"] * size / ranks,
+        "compute": of["c"] * shared_size(case, ranks, size),
         "serial": of["s0"] + of["s1"] * size,
         "storage": (read / min(ranks * STORAGE_OF_RANK, STORAGE)
                     + (written / STORAGE_OF_RANK if is_data else 0)),
-        "network": (traffic(of["messages"], ranks, size) * LATENCY_S
-                    + traffic(of["bytes"], ranks, size) / NETWORK) if shared else 0,
+        "network": network,
     }
 
 
@@ -139,17 +168,18 @@ def fitted_table(cases, fits):
     lines = ["| verb | s0, s | s1, µs a thousand values | c, µs a thousand values | misfit "
              "| messages, busiest rank | bytes, busiest rank |", "|" + "---|" * 7]
     for case, of in zip(cases, fits):
-        terms = [f"({t['a']:.3g} + {t['b']:.3g} D) ({t['shape']})" for t in (of["messages"], of["bytes"])]
+        terms = [" + ".join(f"{factor:.3g} {label}" for factor, label, _ in t["terms"] if factor) or "0"
+                 for t in (of["messages"], of["bytes"])]
         lines.append(f"| {case['name']} | {of['s0']:.2f} | {1e9 * of['s1']:.2f} | {1e9 * of['c']:.1f} "
                      f"| {100 * of['error']:.0f} % | {terms[0]} | {terms[1]} |")
     return lines
 
 
 def modelled_table(cases, fits):
-    lines = ["| verb | data | " + " | ".join(f"{n} ranks" for n in (1, *MANY))
+    lines = ["| verb | times | 1 rank | " + " | ".join(f"{n} ranks" for n in MANY)
              + " | of the last: compute, serial, storage, network |", "|" + "---|" * (len(MANY) + 4)]
     for case, of in zip(cases, fits):
-        unit = PICTURE if case["name"] == "render" else FULL
+        unit = PICTURE if case.get("queue") else FULL
         for times in (10, 1000):
             size = times * unit
             by_ranks = [parts(case, of, n, size) for n in (1, *MANY)]
@@ -161,5 +191,16 @@ def modelled_table(cases, fits):
 
 def tables(cases):
     fits = [fit(case) for case in cases]
-    blocks = [measured_table(cases), fitted_table(cases, fits), modelled_table(cases, fits)]
-    return "\n\n".join("\n".join(lines) for lines in blocks)
+    return [measured_table(cases), fitted_table(cases, fits), modelled_table(cases, fits)]
+
+
+def replace_tables(page, blocks):
+    """The page with each of its tables that begins with the heading of one of `blocks` as that."""
+    lines = page.split("\n")
+    for block in blocks:
+        first = lines.index(block[0])
+        end = first
+        while end < len(lines) and lines[end].startswith("|"):
+            end += 1
+        lines[first:end] = block
+    return "\n".join(lines)

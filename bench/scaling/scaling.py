@@ -2,19 +2,25 @@
 """Verbs under 1, 2 and 4 ranks, and a model of more.
 
     bench/scaling/scaling.py NACRE [--mpirun MPIRUN] [--only VERB …] [--keep measured.json]
-    bench/scaling/scaling.py --from measured.json
+                             [--page docs/scaling.md]
+    bench/scaling/scaling.py --from measured.json [--page docs/scaling.md]
 
 runs verbs that share their work on two sizes of data, one thread a rank, checks that what
 they write has the same bytes, fits a model of their cost (model.py) and prints the tables of
-docs/scaling.md.
+docs/scaling.md, or puts them there.
 """
 
 import argparse
+import array
 import hashlib
 import json
+import math
+import operator
 import os
+import random
 import re
 import resource
+import struct
 import subprocess
 import sys
 import tempfile
@@ -86,66 +92,103 @@ class Bench:
     def tool(self, *arguments):
         self.run(list(arguments), 1)
 
+    def dataset(self, name, points, core):
+        """A veined stone made up: profiles between two of a slab, no two slices alike."""
+        levels = 64
+        cells = [(u - core // 2, v - core // 2) for v in range(core) for u in range(core)]
+        profiles = []
+        for level in range(levels):
+            t = level / (levels - 1)
+            profiles.append([
+                (0.9 - 0.5 * t) * math.exp(-math.hypot(u, v) * (0.25 + 0.1 * c + 0.3 * t))
+                / (1 + u * u + v * v) for c in range(3) for u, v in cells])
+        draw = random.Random(1)
+        noise = [1 + 0.01 * draw.gauss(0, 1) for _ in range(1 << 16)]
+        size = 3 * core * core
+        head = str({"descr": "<f4", "fortran_order": False,
+                    "shape": (points[1], points[0], 3, core, core)}).encode()
+        head += b" " * (63 - (10 + len(head)) % 64) + b"\n"
+        with open(self.folder / "made.npy", "wb") as file:
+            file.write(b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head)
+            for y in range(points[1]):
+                for x in range(points[0]):
+                    vein = math.sin(0.11 * x + 2 * math.sin(0.07 * y)) ** 2
+                    at = draw.randrange(len(noise) - size)
+                    array.array("f", map(operator.mul, profiles[int(vein * (levels - 1))],
+                                         noise[at:at + size])).tofile(file)
+        self.tool("import", "made.npy", "--from", "npy", "--axes", "yxcvu", "--pitch-mm", "0.4",
+                  "--eta", "1.5", "--out", name)
+
     def cases(self, only):
         """Each with two sizes of data; `size` is in values of R_d, or samples of a picture."""
-        def runs(names, *arguments):
-            return [(f"{p[0]} × {p[1]} points, core {core}", [arguments[0], n, *arguments[1:]])
-                    for n, p, core in names]
+        def wanted(name):
+            return not only or any(o in name for o in only)
 
-        def values(names):
-            return [p[0] * p[1] * core * core * 3 for _, p, core in names]
+        def case(name, made, arguments, **more):
+            """`made`: names, points and cores of two sizes."""
+            return dict({
+                "name": name, "out": "o.rd.exr", "passes": 0,
+                "sizes": [p[0] * p[1] * core * core * 3 for _, p, core in made],
+                "runs": [(f"{p[0]} × {p[1]} points, core {core}", [arguments[0], n, *arguments[1:]])
+                         for n, p, core in made]}, **more)
 
         marble = (SOURCE / "rigs/marble-flat.toml").read_text()
-        board = (SOURCE / "rigs/chessboard4x4.toml").read_text()
-        windows = [("w4.toml", (2, 2), 39), ("w16.toml", (4, 4), 39)]
-        beams = [("b2.toml", (2, 1), 39), ("b8.toml", (4, 2), 39)]
-        for text, names in ((marble, windows + beams),):
-            for name, points, core in names:
-                (self.folder / name).write_text(grid(text, points, core))
+        windows = [("w16.toml", (4, 4), 39), ("w32.toml", (8, 4), 39)]
+        beams = [("b8.toml", (4, 2), 39), ("b32.toml", (8, 4), 39)]
+        for name, points, core in windows + beams:
+            (self.folder / name).write_text(grid(marble, points, core))
+        # SVDs are shared from 8192 slices on.
+        many = [("many.rd.exr", (128, 64), 21), ("more.rd.exr", (128, 128), 21)]
+        few = [("few.rd.exr", (40, 40), 9), ("some.rd.exr", (64, 64), 11)]
         cases = [
-            {"name": "simulate fast", "out": "o.rd.exr", "passes": 0, "sizes": values(windows),
-             "runs": runs(windows, "simulate", "--solver", "fast")},
-            {"name": "simulate mc", "out": "o.rd.exr", "passes": 0, "sizes": values(beams),
-             "runs": runs(beams, "simulate", "--solver", "mc", "--photons", "200000")},
-        ]
-        # Factorizations are shared from 8192 slices on.
-        data = [("small.rd.exr", (128, 64), 11), ("large.rd.exr", (128, 128), 11)]
-        if not only or {"factor", "cluster"} & set(only):
-            for name, points, core in data:
-                (self.folder / "board.toml").write_text(grid(board, points, core))
-                self.tool("simulate", "board.toml", "--solver", "fast", "--out", name)
-        for name, verb, passes, out in (
-                ("factor", ["factor", "--method", "log-svd", "--terms", "10"], 2, "o.nacre.exr"),
-                ("cluster", ["cluster", "--clusters", "8"], 1, "o.exr")):
-            cases.append({"name": name, "sizes": values(data), "out": out, "passes": passes,
-                          "runs": runs(data, *verb)})
-        if not only or "reconstruct" in only:
+            case("simulate fast", windows, ["simulate", "--solver", "fast"]),
+            case("simulate mc", beams, ["simulate", "--solver", "mc", "--photons", "100000"])]
+        for method, most in (("svd", {"most_ranks": 64}), ("log-svd", {"most_ranks": 64})):
+            cases.append(case(f"factor {method}", many,
+                              ["factor", "--method", method, "--terms", "10"],
+                              out="o.nacre.exr", passes=2, made=True, **most))
+        # Its pairs are ten million at most, its sums eight, one rank after the other.
+        cases.append(case("factor reciprocal", few, ["factor", "--method", "reciprocal"],
+                          out="o.nacre.exr", passes=5, made=True, most_ranks=8, most_size=2e7,
+                          chain=True))
+        cases.append(case("cluster", many, ["cluster", "--clusters", "8"], out="o.exr", passes=1,
+                          made=True))
+        cases = [c for c in cases if wanted(c["name"])]
+        for name, points, core in many + few:
+            if any(c.get("made") and name in c["runs"][0][1] + c["runs"][1][1] for c in cases):
+                self.dataset(name, points, core)
+        if wanted("reconstruct"):
             cases.append(self.reconstruct_case())
         scene = str(SOURCE / "bench/render/scenes/sphere.xml")
-        cases.append({
-            "name": "render", "out": "o.exr", "passes": 0, "sizes": [256 * 96**2, 256 * 192**2],
-            "runs": [(f"{s}² pixels, 256 samples",
-                      ["render", scene, "-D", f"size={s}", "--spp", "256", "--sampling", "even"])
-                     for s in (96, 192)]})
-        return [c for c in cases if not only or any(o in c["name"] for o in only)]
+        render = {
+            "name": "render", "out": "o.exr", "passes": 0, "queue": True,
+            "sizes": [model.SAMPLES * s**2 for s in (192, 384)],
+            "runs": [(f"{s}² pixels, {model.SAMPLES} samples",
+                      ["render", scene, "-D", f"size={s}", "--spp", str(model.SAMPLES),
+                       "--sampling", "even"])
+                     for s in (192, 384)]}
+        return cases + ([render] if wanted("render") else [])
 
     def reconstruct_case(self):
-        rig = (SOURCE / "rigs/simulated-chessboard4x4-quick.toml").read_text()
-        phantom = (SOURCE / "rigs/chessboard4x4-quick.toml").read_text()
-        runs = []
-        sizes = []
-        for points, core in (((12, 12), 11), ((24, 24), 11)):
+        """Sessions of a rig like rigs/simulated-chessboard4x4.toml, its camera as large as needed."""
+        rig = (SOURCE / "rigs/simulated-chessboard4x4.toml").read_text()
+        phantom = (SOURCE / "rigs/chessboard4x4.toml").read_text()
+        core = 15
+        made = []
+        for points in ((32, 32), (64, 48)):
             name = f"rig-{points[0]}"
-            (self.folder / "chessboard4x4-quick.toml").write_text(grid(phantom, points, core))
+            (self.folder / "chessboard4x4.toml").write_text(grid(phantom, points, core))
             (self.folder / f"{name}.toml").write_text(grid(rig, points, core))
             self.tool("capture", f"{name}.toml", "--out", f"session-{name}")
             self.tool("calibrate", f"session-{name}", "--out", f"{name}.json")
-            runs.append((f"{points[0]} × {points[1]} points",
-                         ["reconstruct", f"session-{name}", "--calibration", f"{name}.json"]))
-            sizes.append(points[0] * points[1] * core * core * 3)
-        read = sum(f.stat().st_size for f in (self.folder / "session-rig-24").rglob("*"))
-        return {"name": "reconstruct", "runs": runs, "sizes": sizes, "out": "o.rd.exr",
-                "passes": 1, "read_bytes_a_value": read / sizes[-1]}
+            made.append((name, points))
+        sizes = [p[0] * p[1] * core * core * 3 for _, p in made]
+        read = sum(f.stat().st_size for f in (self.folder / f"session-{made[-1][0]}").rglob("*"))
+        return {"name": "reconstruct", "sizes": sizes, "out": "o.rd.exr", "passes": 1,
+                "read_bytes_a_value": read / sizes[-1],
+                "runs": [(f"{p[0]} × {p[1]} points, core {core}",
+                          ["reconstruct", f"session-{name}", "--calibration", f"{name}.json"])
+                         for name, p in made]}
 
 
 def main():
@@ -155,6 +198,7 @@ def main():
     parser.add_argument("--only", nargs="*", default=[])
     parser.add_argument("--keep")
     parser.add_argument("--from", dest="measured")
+    parser.add_argument("--page")
     arguments = parser.parse_args()
     if arguments.measured:
         cases = json.loads(Path(arguments.measured).read_text())
@@ -168,7 +212,11 @@ def main():
         print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores", file=sys.stderr)
     if arguments.keep:
         Path(arguments.keep).write_text(json.dumps(cases, indent=1))
-    print(model.tables(cases))
+    tables = model.tables(cases)
+    print("\n\n".join("\n".join(lines) for lines in tables))
+    if arguments.page:
+        page = Path(arguments.page)
+        page.write_text(model.replace_tables(page.read_text(), tables))
 
 
 if __name__ == "__main__":

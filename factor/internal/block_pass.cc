@@ -164,7 +164,7 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
                                        const FillRowFunction& fill,
                                        const std::vector<std::size_t>& channels,
                                        const std::vector<Eigen::MatrixXd>& bases,
-                                       const PassWorkers& workers,
+                                       const Workers& workers,
                                        const ProgressFunction& progress,
                                        const std::string& note) {
   const std::int64_t points = source.header().PointCount();

@@ -1,11 +1,11 @@
 #pragma once
 
 #include "core/progress.h"
-#include "core/ranks.h"
+#include "core/rank_shares.h"
 #include "factor/internal/slice_source.h"
 #include "factor/internal/truncated_svd.h"
+#include "factor/internal/workers.h"
 
-#include <algorithm>
 #include <functional>
 #include <span>
 #include <string>
@@ -27,38 +27,16 @@ struct BlockProduct {
   std::vector<float> u;  ///< [panel][row][kPanel]; of other ranks' rows 0
 };
 
-/// Who does a pass, which doesn't change a bit of its sums.
-struct PassWorkers {
-  int thread_count = 0;
-  const Ranks* ranks = nullptr;  ///< collective calls, unless null
-};
-
 /// The rows of that many that this rank reads in a pass.
 RankShare PassShare(std::int64_t points, int rank, int size);
 RankShare PassShare(std::int64_t points, const Ranks* ranks);
 
-/// Collective: planes of `width` values a row, of which each rank has those of its
-/// share, are whole in all of them.
+/// Collective: rows of which each rank has those of its share, in all of them.
 template <class T>
-void JoinPassRows(std::int64_t points,
-                  std::size_t width,
-                  const Ranks* ranks,
-                  std::span<T> plane) {
-  if (ranks == nullptr || ranks->size() == 1) {
-    return;
-  }
-  const auto part = [&](const RankShare& share) {
-    return plane.subspan(static_cast<std::size_t>(share.begin) * width,
-                         static_cast<std::size_t>(share.end - share.begin) * width);
-  };
-  const auto all =
-      ranks->AllGather(ToBytes(std::span<const T>(part(PassShare(points, ranks)))));
-  for (std::size_t rank = 0; rank < all.size(); ++rank) {
-    const std::span<T> to =
-        part(PassShare(points, static_cast<int>(rank), ranks->size()));
-    const auto values = FromBytes<T>(all[rank]);
-    std::copy(values.begin(), values.end(), to.begin());
-  }
+void JoinPassRows(std::int64_t points, const Ranks* ranks, std::span<T> plane) {
+  JoinSharesBy(points, ranks, plane, [&](int rank, int size) {
+    return PassShare(points, rank, size);
+  });
 }
 
 /// One pass for the matrices of `channels`, with a basis each (all of a whole number of
@@ -69,7 +47,7 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
                                        const FillRowFunction& fill,
                                        const std::vector<std::size_t>& channels,
                                        const std::vector<Eigen::MatrixXd>& bases,
-                                       const PassWorkers& workers,
+                                       const Workers& workers,
                                        const ProgressFunction& progress,
                                        const std::string& note);
 

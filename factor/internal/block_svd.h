@@ -19,7 +19,7 @@ struct BlockSvdOptions {
   int least_passes = 1;
   int most_passes = 12;
   int spare = 4;  ///< columns beyond the terms, at least: more save passes
-  PassWorkers workers = {};
+  Workers workers = {};
 };
 
 /// One matrix' truncated SVD.

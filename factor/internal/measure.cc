@@ -1,7 +1,7 @@
 #include "factor/internal/measure.h"
 
 #include "core/parallel.h"
-#include "core/ranks.h"
+#include "core/rank_shares.h"
 #include "factor/internal/equal_rows.h"
 #include "factor/internal/material_codes.h"
 #include "factor/internal/reciprocal.h"
@@ -145,7 +145,7 @@ SliceFit WorstOf(const std::vector<SliceFit>& fits) {
 
 // Albedo of all slices of a reciprocal material, and how far their totals are off.
 SliceFit SumAll(const Job& job, Material& m) {
-  const std::vector<double> totals = ReciprocalTotals(m, job.options.thread_count);
+  const std::vector<double> totals = ReciprocalTotals(m, WorkersOf(job));
   SliceFit all;
   for (std::size_t at = 0; at < totals.size(); ++at) {
     m.albedo[at] = RoundAlbedo(totals[at] * m.pitch_mm * m.pitch_mm, !m.steps.empty());
@@ -179,19 +179,6 @@ SliceFit ScaleAll(const Job& job, Material& m) {
   return WorstOf(fits);
 }
 
-// Collective: the fits of all ranks one after the other, in all of them.
-void Join(const Ranks* ranks, std::vector<SliceFit>& fits) {
-  if (ranks == nullptr) {
-    return;
-  }
-  const auto parts = ranks->AllGather(ToBytes(std::span<const SliceFit>(fits)));
-  fits.clear();
-  for (const std::string& part : parts) {
-    const auto those = FromBytes<SliceFit>(part);
-    fits.insert(fits.end(), those.begin(), those.end());
-  }
-}
-
 // Totals are those of all slices; errors are measured on some.
 void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
   const SliceFit all = m.form == Form::kReciprocal ? SumAll(job, m) : ScaleAll(job, m);
@@ -199,10 +186,11 @@ void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
   const double floor = reconstruct::kLogFloor * job.Peak();
   const reconstruct::RdDataset& data = job.check.dataset;
   const RankShare share = ShareOf(std::ssize(job.check.rows), job.options.ranks);
-  std::vector<SliceFit> fits(static_cast<std::size_t>(share.end - share.begin));
-  ParallelFor(std::ssize(fits), job.options.thread_count, [&](std::int64_t n) {
-    SliceFit& fit = fits[static_cast<std::size_t>(n)];
+  const std::int64_t own = share.end - share.begin;
+  std::vector<SliceFit> fits(job.check.rows.size());
+  ParallelFor(own, job.options.thread_count, [&](std::int64_t n) {
     const auto r = static_cast<std::size_t>(share.begin + n);
+    SliceFit& fit = fits[r];
     const std::int64_t point = job.check.rows[r];
     std::vector<float> windows(window * m.channels.size());
     const GridIndex index{static_cast<int>(point % m.points_x),
@@ -222,11 +210,22 @@ void MeasureCheck(Job& job, Material& m, FactorSummary& summary) {
       fit.worst_channel = std::max(fit.worst_channel, error.RelativeL2());
     }
   });
-  Join(job.options.ranks, fits);
+  JoinShares(std::ssize(fits), job.options.ranks, std::span(fits));
   Summarize(
       job, fits, [&](std::size_t n) { return job.check.rows[n]; }, m, summary);
   summary.worst_total = all.worst_total;
   summary.unfit_slices = all.unfit;
+}
+
+// Collective: what each rank found of its slices is in all of them.
+void JoinMeasured(const Ranks* ranks, std::vector<SliceFit>& fits, Material& m) {
+  const auto points = static_cast<std::size_t>(m.PointCount());
+  JoinShares(m.PointCount(), ranks, std::span(fits));
+  for (std::size_t c = 0; c < m.channels.size(); ++c) {
+    for (std::vector<float>* values : {&m.row_scale, &m.albedo}) {
+      JoinShares(m.PointCount(), ranks, std::span(*values).subspan(c * points, points));
+    }
+  }
 }
 
 }  // namespace
@@ -245,9 +244,13 @@ void Measure(Job& job, Material& m, FactorSummary& summary) {
   const auto window = static_cast<std::size_t>(m.WindowSize());
   const double floor = reconstruct::kLogFloor * job.Peak();
   std::vector<SliceFit> fits(static_cast<std::size_t>(points));
-  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+  // Of distinct slices there are few, and their places are anywhere.
+  const RankShare share =
+      equal != nullptr ? RankShare{0, points} : ShareOf(points, job.options.ranks);
+  for (std::int64_t first = share.begin; first < share.end; first += kBlockRows) {
     Report(job.progress, {"factor", first, points, "errors"});
-    const SliceBlock block = source.Read(first, std::min(kBlockRows, points - first));
+    const SliceBlock block =
+        source.Read(first, std::min(kBlockRows, share.end - first));
     ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
       SliceFit& fit = fits[static_cast<std::size_t>(first + row)];
       std::vector<float> values(window);
@@ -275,6 +278,7 @@ void Measure(Job& job, Material& m, FactorSummary& summary) {
     CopyFromFirst(*equal, m.albedo);
   } else {
     ++job.passes;
+    JoinMeasured(job.options.ranks, fits, m);
   }
   Summarize(
       job,
@@ -290,8 +294,10 @@ FitError SampleError(const Job& job, const Material& m) {
   const double floor = reconstruct::kLogFloor * job.Peak();
   const reconstruct::RdDataset& data = job.sample.dataset;
   std::vector<FitError> errors(job.sample.rows.size());
-  ParallelFor(std::ssize(errors), job.options.thread_count, [&](std::int64_t row) {
-    const auto r = static_cast<std::size_t>(row);
+  const RankShare share = ShareOf(std::ssize(errors), job.options.ranks);
+  const std::int64_t own = share.end - share.begin;
+  ParallelFor(own, job.options.thread_count, [&](std::int64_t n) {
+    const auto r = static_cast<std::size_t>(share.begin + n);
     const auto i = static_cast<int>(job.sample.rows[r] % m.points_x);
     const auto j = static_cast<int>(job.sample.rows[r] / m.points_x);
     std::vector<float> values(window);
@@ -309,6 +315,7 @@ FitError SampleError(const Job& job, const Material& m) {
       errors[r] += ErrorOf(rd, valid, values, floor);
     }
   });
+  JoinShares(std::ssize(errors), job.options.ranks, std::span(errors));
   FitError sum;
   for (const FitError& error : errors) {
     sum += error;

@@ -3,6 +3,7 @@
 #include "factor/factor.h"
 #include "factor/internal/mean_slice.h"
 #include "factor/internal/slice_source.h"
+#include "factor/internal/workers.h"
 
 #include <functional>
 #include <memory>
@@ -57,6 +58,10 @@ struct Job {
 };
 
 bool IsSvd(const std::string& method);
+
+inline Workers WorkersOf(const Job& job) {
+  return {job.options.thread_count, job.options.ranks};
+}
 
 /// Fills `sample` and `scans`, or, where a method can do with one reading of all slices
 /// (the SVDs, large data, nothing missing), `sample`, `check` and its scans.

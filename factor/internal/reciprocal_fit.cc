@@ -133,15 +133,15 @@ void MakeCanonical(const ReciprocalData& data, ReciprocalFit& fit) {
 // themselves crawl along valleys where maps and kernels have to change together.
 class MapDescent {
  public:
-  MapDescent(const ReciprocalData& data, int thread_count, double error)
-      : data_(data), thread_count_(thread_count), error_(error) {}
+  MapDescent(const ReciprocalData& data, const Workers& workers, double error)
+      : data_(data), workers_(workers), error_(error) {}
 
   double error() const { return error_; }
 
   // False if no step lowers the error.
   bool Round(ReciprocalFit& fit) {
     ++fit.rounds;
-    const MapChange now = MapStep(data_, fit, thread_count_);
+    const MapChange now = MapStep(data_, fit, workers_);
     const double own_slope = Dot(now.pull, now.step);
     SharedMaps along = now.step;
     double slope = own_slope;
@@ -181,8 +181,8 @@ class MapDescent {
     Trial trial{fit, {}, length, 0};
     trial.fit.f += static_cast<float>(length) * along;
     trial.root = Whiten(data_, trial.fit);
-    trial.error = SolveReciprocalKernels(
-        data_, KernelStart::kGoOn, false, thread_count_, trial.fit);
+    trial.error =
+        SolveReciprocalKernels(data_, KernelStart::kGoOn, false, workers_, trial.fit);
     return trial;
   }
 
@@ -210,7 +210,7 @@ class MapDescent {
   }
 
   const ReciprocalData& data_;
-  int thread_count_;
+  Workers workers_;
   double error_;
   double last_slope_ = 0;  // 0: no direction to go on in
   SharedMaps last_step_;
@@ -222,19 +222,19 @@ class MapDescent {
 ReciprocalFit FitReciprocal(ReciprocalData& data,
                             const SharedMaps& start,
                             int taps,
-                            int thread_count,
+                            const Workers& workers,
                             const ProgressFunction& progress) {
   ReciprocalFit fit{.f = start, .taps = taps, .h = {}};
   Whiten(data, fit);
   double least =
-      SolveReciprocalKernels(data, KernelStart::kLogarithms, true, thread_count, fit);
+      SolveReciprocalKernels(data, KernelStart::kLogarithms, true, workers, fit);
   if (!data.has_weights) {
-    SetHeldWeights(fit, thread_count, data);
-    SetSampleWeights(fit, thread_count, data);
+    SetHeldWeights(fit, workers.thread_count, data);
+    SetSampleWeights(fit, workers.thread_count, data);
     data.has_weights = true;
-    least = SolveReciprocalKernels(data, KernelStart::kGoOn, false, thread_count, fit);
+    least = SolveReciprocalKernels(data, KernelStart::kGoOn, false, workers, fit);
   }
-  MapDescent descent(data, thread_count, least);
+  MapDescent descent(data, workers, least);
   for (int small = 0; fit.rounds < kMostRounds && small < 2;) {
     Report(progress, {"factor", fit.rounds, kMostRounds, "alternating"});
     const double before = descent.error();
@@ -244,7 +244,7 @@ ReciprocalFit FitReciprocal(ReciprocalData& data,
     small = descent.error() > (1 - kEnough) * before ? small + 1 : 0;
   }
   MakeCanonical(data, fit);
-  SolveReciprocalKernels(data, KernelStart::kLogarithms, true, thread_count, fit);
+  SolveReciprocalKernels(data, KernelStart::kLogarithms, true, workers, fit);
   return fit;
 }
 

@@ -3,6 +3,7 @@
 #include "core/progress.h"
 #include "factor/internal/reciprocal_data.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "factor/internal/workers.h"
 
 namespace nacre::factor::internal {
 
@@ -23,11 +24,12 @@ enum class KernelStart { kLogarithms, kGoOn };
 
 /// Weighted least squares for the kernels of all held offsets (or of all), given the
 /// maps, an offset and channel at a time, in R_d: Gauss–Newton with the exponential
-/// linearised. Returns Σ weight · error² over the sample of those offsets.
+/// linearised. Ranks share offsets. Returns Σ weight · error² over the sample of those
+/// offsets.
 double SolveReciprocalKernels(const ReciprocalData& data,
                               KernelStart start,
                               bool all_cells,
-                              int thread_count,
+                              const Workers& workers,
                               ReciprocalFit& fit);
 
 /// Makes of each pair's variance its weight, 1 / (variance + tolerance): the tolerance
@@ -38,14 +40,15 @@ void SetSampleWeights(const ReciprocalFit& fit, int thread_count, ReciprocalData
 /// The Gauss–Newton step of all maps at once, given the kernels: conjugate gradients on
 /// the normal equations, preconditioned by each point's own block. Standard deviations
 /// of 1 are known of the maps beforehand, which holds points that little was measured
-/// of. `pull` is half of what the error falls by along a change of the maps.
+/// of. Ranks share sums over offsets. `pull` is half of what the error falls by along a
+/// change of the maps.
 struct MapChange {
   SharedMaps step;
   SharedMaps pull;
 };
 MapChange MapStep(const ReciprocalData& data,
                   const ReciprocalFit& fit,
-                  int thread_count);
+                  const Workers& workers);
 
 /// Follows MapStep, each time with kernels that fit the maps, until it gains little. No
 /// round raises the error. Maps end turned so that each contributes as much as possible
@@ -53,7 +56,7 @@ MapChange MapStep(const ReciprocalData& data,
 ReciprocalFit FitReciprocal(ReciprocalData& data,
                             const SharedMaps& start,
                             int taps,
-                            int thread_count,
+                            const Workers& workers,
                             const ProgressFunction& progress);
 
 }  // namespace nacre::factor::internal

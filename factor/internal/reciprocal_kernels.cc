@@ -1,6 +1,7 @@
 // Kernels of the reciprocal model, given its maps.
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/reciprocal_fit.h"
 #include "factor/internal/reciprocal_taps.h"
 #include "factor/internal/row_streams.h"
@@ -186,12 +187,46 @@ double Refine(const Eigen::MatrixXd& design,
   return error;
 }
 
+// How a column's kernels are begun with.
+struct ColumnStart {
+  KernelStart from;
+  int steps;  // Gauss–Newton
+  Eigen::VectorXd h;
+};
+
+// Kernels of a channel and cell, from `h` on; after them stands the error that is left.
+Eigen::VectorXd SolveColumn(const ReciprocalData& data,
+                            const Eigen::MatrixXd& design,
+                            const Target& target,
+                            const ColumnStart& start,
+                            std::size_t column) {
+  Eigen::VectorXd h = start.h;
+  double error = 0;
+  if (!(target.weight.sum() > 0)) {  // never measured
+    h.setZero();
+    h(0) = std::log(std::max(data.mean[column], kLeast));
+  } else {
+    if (start.from == KernelStart::kLogarithms) {
+      const Eigen::VectorXd fresh =
+          FromLogarithms(design, target, data.mean[column], data.noise[column]);
+      if (h.isZero(0) ||
+          ErrorOf(target, design * fresh) < ErrorOf(target, design * h)) {
+        h = fresh;
+      }
+    }
+    error = Refine(design, target, start.steps, h);
+  }
+  Eigen::VectorXd solved(h.size() + 1);
+  solved << h, error;
+  return solved;
+}
+
 }  // namespace
 
 double SolveReciprocalKernels(const ReciprocalData& data,
                               KernelStart start,
                               bool all_cells,
-                              int thread_count,
+                              const Workers& workers,
                               ReciprocalFit& fit) {
   const int kernels = ReciprocalKernelCount(fit.Terms(), fit.taps);
   if (fit.h.rows() != kernels) {
@@ -199,40 +234,41 @@ double SolveReciprocalKernels(const ReciprocalData& data,
         kernels, static_cast<Eigen::Index>(data.channels * data.cells));
   }
   const std::size_t count = all_cells ? data.cells : data.held.size();
-  std::vector<double> errors(count * data.channels, 0.0);
-  ParallelFor(static_cast<std::int64_t>(count), thread_count, [&](std::int64_t n) {
-    const auto at = static_cast<std::size_t>(n);
-    const std::size_t cell = all_cells ? at : static_cast<std::size_t>(data.held[at]);
-    const KernelSample sample = SampleOf(data, cell);
-    const Eigen::MatrixXd design = Design(data, fit, cell, sample.at);
+  const auto cell_of = [&](std::size_t n) {
+    return all_cells ? n : static_cast<std::size_t>(data.held[n]);
+  };
+  // A column a cell and channel: its kernels, and the error that is left.
+  Eigen::MatrixXd solved = Eigen::MatrixXd::Zero(
+      kernels + 1, static_cast<Eigen::Index>(count * data.channels));
+  const RankShare share = ShareOf(static_cast<std::int64_t>(count), workers.ranks);
+  ParallelFor(share.end - share.begin, workers.thread_count, [&](std::int64_t own) {
+    const auto n = static_cast<std::size_t>(share.begin + own);
+    const KernelSample sample = SampleOf(data, cell_of(n));
+    const Eigen::MatrixXd design = Design(data, fit, cell_of(n), sample.at);
     for (std::size_t c = 0; c < data.channels; ++c) {
-      const std::size_t column = c * data.cells + cell;
+      const std::size_t column = c * data.cells + cell_of(n);
       const Target target =
           TargetOf(data, sample, c, Tolerance(data.mean[column], data.tail_weight));
-      Eigen::VectorXd h = fit.h.col(static_cast<Eigen::Index>(column));
-      if (!(target.weight.sum() > 0)) {  // never measured
-        h.setZero();
-        h(0) = std::log(std::max(data.mean[column], kLeast));
-        fit.h.col(static_cast<Eigen::Index>(column)) = h;
-        continue;
-      }
-      if (start == KernelStart::kLogarithms) {
-        const Eigen::VectorXd fresh =
-            FromLogarithms(design, target, data.mean[column], data.noise[column]);
-        const bool is_first = h.isZero(0);
-        if (is_first || ErrorOf(target, design * fresh) < ErrorOf(target, design * h)) {
-          h = fresh;
-        }
-      }
-      errors[at * data.channels + c] =
-          Refine(design, target, all_cells ? kLastSteps : 1, h);
-      fit.h.col(static_cast<Eigen::Index>(column)) = h;
+      solved.col(static_cast<Eigen::Index>(n * data.channels + c)) =
+          SolveColumn(data,
+                      design,
+                      target,
+                      {start,
+                       all_cells ? kLastSteps : 1,
+                       fit.h.col(static_cast<Eigen::Index>(column))},
+                      column);
     }
   });
+  JoinShares(static_cast<std::int64_t>(count),
+             workers.ranks,
+             std::span(solved.data(), static_cast<std::size_t>(solved.size())));
   double sum = 0;
-  for (std::size_t n = 0; n < errors.size(); ++n) {
-    sum += errors[n] *
-           (all_cells ? 1.0 : static_cast<double>(data.share[n / data.channels]));
+  for (Eigen::Index at = 0; at < solved.cols(); ++at) {
+    const std::size_t n = static_cast<std::size_t>(at) / data.channels;
+    const std::size_t c = static_cast<std::size_t>(at) % data.channels;
+    fit.h.col(static_cast<Eigen::Index>(c * data.cells + cell_of(n))) =
+        solved.col(at).head(kernels);
+    sum += solved(kernels, at) * (all_cells ? 1.0 : static_cast<double>(data.share[n]));
   }
   return sum;
 }

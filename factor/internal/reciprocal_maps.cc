@@ -1,6 +1,7 @@
 // Maps of the reciprocal model, given its kernels.
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/reciprocal_fit.h"
 #include "factor/internal/reciprocal_rows.h"
 
@@ -14,7 +15,7 @@ namespace nacre::factor::internal {
 namespace {
 
 // Offsets are dealt to this many sums, which are added in their order: the bits don't
-// depend on the number of threads.
+// depend on the number of threads and ranks.
 constexpr std::size_t kGroups = 8;
 constexpr int kMostSteps = 8;     // of conjugate gradients
 constexpr double kEnough = 1e-3;  // of the squared residual, preconditioned
@@ -36,12 +37,14 @@ using RowWork = std::function<void(ReciprocalRows& rows,
 SharedMaps OverRows(const ReciprocalData& data,
                     const ReciprocalFit& fit,
                     Eigen::Index height,
-                    int thread_count,
+                    const Workers& workers,
                     const RowWork& work) {
-  std::vector<SharedMaps> sums(kGroups);
-  ParallelFor(kGroups, thread_count, [&](std::int64_t group) {
-    const auto g = static_cast<std::size_t>(group);
-    sums[g] = SharedMaps::Zero(height, static_cast<Eigen::Index>(data.Plane()));
+  const auto plane = static_cast<Eigen::Index>(data.Plane());
+  const RankShare share = ShareOf(kGroups, workers.ranks);
+  std::vector<SharedMaps> sums(static_cast<std::size_t>(share.end - share.begin),
+                               SharedMaps::Zero(height, plane));
+  ParallelFor(std::ssize(sums), workers.thread_count, [&](std::int64_t own) {
+    const auto g = static_cast<std::size_t>(share.begin + own);
     RowScratch scratch;
     std::vector<float> s;
     std::vector<ReciprocalRows> offsets;
@@ -66,15 +69,19 @@ SharedMaps OverRows(const ReciprocalData& data,
                    static_cast<std::size_t>(y * data.width + area.x0),
                data.share[n],
                s,
-               sums[g]);
+               sums[static_cast<std::size_t>(own)]);
         }
       }
     }
   });
-  for (std::size_t g = 1; g < kGroups; ++g) {
-    sums[0] += sums[g];
+  std::vector<std::span<const float>> own;
+  for (const SharedMaps& sum : sums) {
+    own.emplace_back(sum.data(), static_cast<std::size_t>(sum.size()));
   }
-  return std::move(sums[0]);
+  SharedMaps total(height, plane);
+  const std::span all(total.data(), static_cast<std::size_t>(total.size()));
+  SumInOrder<float>(kGroups, own, workers.ranks, all);
+  return total;
 }
 
 __attribute__((target_clones("avx512f", "avx2", "default"))) void Multiply(
@@ -104,19 +111,19 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void LinearizeRow(
 
 // The weights of changes of the logarithm, and what residuals pull with.
 struct Linearized {
-  std::vector<float> weight;  ///< [pair]
+  std::vector<float> weight;  ///< [pair]; of other ranks' offsets 0
   SharedMaps pull;
 };
 
 Linearized Linearize(const ReciprocalData& data,
                      const ReciprocalFit& fit,
-                     int thread_count) {
+                     const Workers& workers) {
   Linearized result;
   result.weight.assign(data.pairs.value.size(), 0.0F);
   result.pull = OverRows(data,
                          fit,
                          fit.f.rows(),
-                         thread_count,
+                         workers,
                          [&](ReciprocalRows& rows,
                              std::size_t at,
                              float share,
@@ -141,20 +148,20 @@ class Preconditioner {
   Preconditioner(const ReciprocalData& data,
                  const ReciprocalFit& fit,
                  const std::vector<float>& weight,
-                 int thread_count)
+                 const Workers& workers)
       : terms_(fit.f.rows()),
-        thread_count_(thread_count),
+        thread_count_(workers.thread_count),
         blocks_(OverRows(data,
                          fit,
                          terms_ * (terms_ + 1) / 2,
-                         thread_count,
+                         workers,
                          [&](ReciprocalRows& rows,
                              std::size_t at,
                              float,
                              std::vector<float>&,
                              SharedMaps& sum) { rows.Blocks(&weight[at], sum); })) {
     ParallelForBlocks(
-        blocks_.cols(), 4096, thread_count, [&](std::int64_t p0, std::int64_t p1) {
+        blocks_.cols(), 4096, thread_count_, [&](std::int64_t p0, std::int64_t p1) {
           for (std::int64_t p = p0; p < p1; ++p) {
             Store(p, Block(p).llt().solve(Eigen::MatrixXd::Identity(terms_, terms_)));
           }
@@ -212,15 +219,15 @@ class Preconditioner {
 
 MapChange MapStep(const ReciprocalData& data,
                   const ReciprocalFit& fit,
-                  int thread_count) {
-  const Linearized linear = Linearize(data, fit, thread_count);
-  const Preconditioner preconditioner(data, fit, linear.weight, thread_count);
+                  const Workers& workers) {
+  const Linearized linear = Linearize(data, fit, workers);
+  const Preconditioner preconditioner(data, fit, linear.weight, workers);
   const auto normal = [&](const SharedMaps& change) -> SharedMaps {
     return static_cast<float>(kPrior) * change +
            OverRows(data,
                     fit,
                     fit.f.rows(),
-                    thread_count,
+                    workers,
                     [&](ReciprocalRows& rows,
                         std::size_t at,
                         float,

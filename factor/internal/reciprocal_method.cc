@@ -27,7 +27,7 @@ class ReciprocalMethod final : public Method {
     const ReciprocalFit fit = FitReciprocal(data_,
                                             start_.topRows(terms),
                                             job_.options.taps,
-                                            job_.options.thread_count,
+                                            WorkersOf(job_),
                                             job_.progress);
     rounds_ += fit.rounds;
     const ReciprocalRest rest =

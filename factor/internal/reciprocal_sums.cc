@@ -1,6 +1,7 @@
 #include "factor/internal/reciprocal_sums.h"
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/reciprocal_taps.h"
 #include "factor/internal/row_streams.h"
 
@@ -174,19 +175,22 @@ std::vector<float> WideScale(const Material& m, int channel) {
 
 }  // namespace
 
-std::vector<double> ReciprocalTotals(const Material& m, int thread_count) {
+std::vector<double> ReciprocalTotals(const Material& m, const Workers& workers) {
   const auto points = static_cast<std::size_t>(m.PointCount());
   const std::size_t channels = m.channels.size();
   const auto cells = static_cast<std::size_t>(m.WindowSize() + 1) / 2;
+  const RankShare share = ShareOf(kGroups, workers.ranks);
+  std::vector<std::vector<double>> sums(
+      static_cast<std::size_t>(share.end - share.begin));
   std::vector<double> totals(channels * points, 0.0);
   for (std::size_t c = 0; c < channels; ++c) {
     const std::vector<float> scale = WideScale(m, static_cast<int>(c));
-    std::vector<std::vector<double>> sums(kGroups);
-    ParallelFor(kGroups, thread_count, [&](std::int64_t group) {
-      const auto g = static_cast<std::size_t>(group);
-      sums[g].assign(points, 0.0);
+    ParallelFor(std::ssize(sums), workers.thread_count, [&](std::int64_t own) {
+      std::vector<double>& sum = sums[static_cast<std::size_t>(own)];
+      sum.assign(points, 0.0);
       std::vector<OffsetRows> offsets;
-      for (std::size_t cell = g; cell < cells; cell += kGroups) {
+      for (auto cell = static_cast<std::size_t>(share.begin + own); cell < cells;
+           cell += kGroups) {
         offsets.emplace_back(m,
                              static_cast<int>(c),
                              static_cast<std::int64_t>(cell),
@@ -194,15 +198,16 @@ std::vector<double> ReciprocalTotals(const Material& m, int thread_count) {
       }
       for (int y = 0; y < m.MapHeight(); ++y) {
         for (OffsetRows& offset : offsets) {
-          offset.Add(y, sums[g].data());
+          offset.Add(y, sum.data());
         }
       }
-    });
-    for (const std::vector<double>& sum : sums) {
-      for (std::size_t p = 0; p < points; ++p) {
-        totals[c * points + p] += m.a[c] * sum[p];
+      for (double& value : sum) {
+        value *= m.a[c];
       }
-    }
+    });
+    const std::vector<std::span<const double>> own(sums.begin(), sums.end());
+    SumInOrder<double>(
+        kGroups, own, workers.ranks, std::span(totals).subspan(c * points, points));
   }
   return totals;
 }

@@ -1,6 +1,7 @@
 #include "factor/internal/reciprocal_totals.h"
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/reciprocal.h"
 #include "factor/internal/reciprocal_sums.h"
 
@@ -44,10 +45,11 @@ std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
   const std::int64_t points = m.PointCount();
   const auto channels = static_cast<int>(m.channels.size());
   std::vector<Interval> wanted(m.row_scale.size());
-  for (std::int64_t first = 0; first < points; first += kBlockRows) {
+  const RankShare share = ShareOf(points, job.options.ranks);
+  for (std::int64_t first = share.begin; first < share.end; first += kBlockRows) {
     Report(job.progress, {"factor", first, points, "totals"});
     const SliceBlock block =
-        job.source.Read(first, std::min(kBlockRows, points - first));
+        job.source.Read(first, std::min(kBlockRows, share.end - first));
     ParallelFor(block.count, job.options.thread_count, [&](std::int64_t row) {
       const std::int64_t point = first + row;
       std::vector<float> values(window * m.channels.size());
@@ -77,6 +79,12 @@ std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
         }
       }
     });
+  }
+  for (std::size_t c = 0; c < m.channels.size(); ++c) {
+    JoinShares(points,
+               job.options.ranks,
+               std::span(wanted).subspan(c * static_cast<std::size_t>(points),
+                                         static_cast<std::size_t>(points)));
   }
   ++job.passes;
   return wanted;
@@ -114,9 +122,12 @@ void BalanceChannel(const Job& job,
   const auto points = static_cast<std::size_t>(m.PointCount());
   float* scale = &m.row_scale[static_cast<std::size_t>(channel) * points];
   std::vector<std::uint8_t> marked(points, 1);
+  const RankShare share = ShareOf(m.PointCount(), job.options.ranks);
   for (int round = 0; round < kMostRounds; ++round) {
     std::vector<float> next(scale, scale + points);
-    ParallelFor(m.PointCount(), job.options.thread_count, [&](std::int64_t p) {
+    const std::int64_t count = share.end - share.begin;
+    ParallelFor(count, job.options.thread_count, [&](std::int64_t own) {
+      const std::int64_t p = share.begin + own;
       const auto n = static_cast<std::size_t>(p);
       if (marked[n] == 0) {
         return;
@@ -128,6 +139,7 @@ void BalanceChannel(const Job& job,
         next[n] = static_cast<float>(std::clamp(factor, 1 / kFarthest, kFarthest));
       }
     });
+    JoinShares(m.PointCount(), job.options.ranks, std::span(next));
     std::fill(marked.begin(), marked.end(), std::uint8_t{0});
     bool moved = false;
     for (std::size_t p = 0; p < points; ++p) {
@@ -156,7 +168,7 @@ void BalanceTotals(Job& job, double bound, Material& m) {
   }
   const std::vector<Interval> wanted =
       Wanted(job, std::max(bound - static_cast<double>(step), 0.0), m);
-  const std::vector<double> totals = ReciprocalTotals(m, job.options.thread_count);
+  const std::vector<double> totals = ReciprocalTotals(m, WorkersOf(job));
   for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
     const auto first = static_cast<std::size_t>(c * m.PointCount());
     BalanceChannel(job, c, &totals[first], &wanted[first], step, m);

@@ -70,9 +70,9 @@ void RowScans::Join(const Ranks* ranks) {
   }
   const auto count = static_cast<std::size_t>(points);
   for (std::size_t begin = 0; begin < low.size(); begin += count) {
-    JoinPassRows(points, 1, ranks, std::span<float>(low).subspan(begin, count));
-    JoinPassRows(points, 1, ranks, std::span<float>(high).subspan(begin, count));
-    JoinPassRows(points, 1, ranks, std::span<double>(total).subspan(begin, count));
+    JoinPassRows(points, ranks, std::span<float>(low).subspan(begin, count));
+    JoinPassRows(points, ranks, std::span<float>(high).subspan(begin, count));
+    JoinPassRows(points, ranks, std::span<double>(total).subspan(begin, count));
   }
   std::int64_t missing[] = {has_missing ? 1 : 0};
   ranks->Sum(missing);

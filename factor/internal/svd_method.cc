@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/log_svd.h"
 #include "factor/internal/method.h"
 #include "factor/internal/projection.h"
@@ -135,41 +136,53 @@ class SvdMethod final : public Method {
     return true;
   }
 
+  // A channel's transform, and how many were tried.
+  struct Choice {
+    RowTransform transform;
+    std::int64_t tried = 0;
+  };
+
+  Choice ChooseFor(std::size_t c) const {
+    const ChannelScan& scan = model_.scans[c];
+    const bool is_log = job_.options.method == "log-svd";
+    const double scale = std::max(scan.peak, -scan.least);
+    // A channel of zeros: any A and B give ln B = 0 everywhere.
+    RowTransform transform{.is_log = is_log,
+                           .a = scale > 0 ? scale : 1,
+                           .is_root = job_.options.method == "sqrt-svd"};
+    if (!is_log || !(scale > 0)) {
+      return {transform};
+    }
+    if (job_.made != nullptr && KeepsTransforms(job_)) {
+      transform.a = job_.made->a[c];
+      transform.b = job_.made->b[c];
+      return {transform};
+    }
+    const TransformChoice choice =
+        ChooseTransform(FilledRows(job_.sample.dataset, c, scan),
+                        {.terms = job_.options.terms,
+                         .peak = scale,
+                         .least = scan.least,
+                         .log_weight = job_.options.log_weight});
+    return {choice.transform, choice.evaluations};
+  }
+
+  // Channels by rank.
   void ChooseTransforms() {
+    const auto channels = std::ssize(model_.scans);
+    std::vector<Choice> choices(model_.scans.size());
+    const RankShare share = ShareOf(channels, job_.options.ranks);
+    ParallelFor(
+        share.end - share.begin, job_.options.thread_count, [&](std::int64_t own) {
+          const auto c = static_cast<std::size_t>(share.begin + own);
+          choices[c] = ChooseFor(c);
+        });
+    JoinShares(channels, job_.options.ranks, std::span(choices));
+    model_.transforms.clear();
     search_steps_ = 0;
-    const std::size_t channels = model_.scans.size();
-    model_.transforms.assign(channels, {});
-    std::vector<int> steps(channels, 0);
-    ParallelFor(static_cast<std::int64_t>(channels),
-                job_.options.thread_count,
-                [&](std::int64_t n) {
-                  const auto c = static_cast<std::size_t>(n);
-                  const ChannelScan& scan = model_.scans[c];
-                  const bool is_log = job_.options.method == "log-svd";
-                  const double scale = std::max(scan.peak, -scan.least);
-                  // A channel of zeros: any A and B give ln B = 0 everywhere.
-                  model_.transforms[c] = {.is_log = is_log,
-                                          .a = scale > 0 ? scale : 1,
-                                          .is_root = job_.options.method == "sqrt-svd"};
-                  if (!is_log || !(scale > 0)) {
-                    return;
-                  }
-                  if (job_.made != nullptr && KeepsTransforms(job_)) {
-                    model_.transforms[c].a = job_.made->a[c];
-                    model_.transforms[c].b = job_.made->b[c];
-                    return;
-                  }
-                  const auto choice =
-                      ChooseTransform(FilledRows(job_.sample.dataset, c, scan),
-                                      {.terms = job_.options.terms,
-                                       .peak = scale,
-                                       .least = scan.least,
-                                       .log_weight = job_.options.log_weight});
-                  model_.transforms[c] = choice.transform;
-                  steps[c] = choice.evaluations;
-                });
-    for (const int n : steps) {
-      search_steps_ += n;
+    for (const Choice& choice : choices) {
+      model_.transforms.push_back(choice.transform);
+      search_steps_ += static_cast<int>(choice.tried);
     }
   }
 

@@ -1,6 +1,7 @@
 #include "reconstruct/internal/separation.h"
 
 #include "core/parallel.h"
+#include "core/ranks.h"
 
 #include <algorithm>
 #include <array>
@@ -41,13 +42,14 @@ Separation::Separation(const RdHeader& header,
                        const acquire::Schedule& schedule,
                        const GroupReader& reader,
                        const GroupSpool& spool,
-                       int thread_count)
+                       const ReconstructOptions& options)
     : header_(header),
       schedule_(schedule),
       spool_(spool),
       lattice_(header),
       channels_(static_cast<int>(header.channels.size())),
-      thread_count_(thread_count),
+      thread_count_(options.thread_count),
+      ranks_(options.ranks),
       group_of_(GroupsOf(header, schedule)),
       lit_(reader.LitPoints()),
       tails_(header),
@@ -267,8 +269,10 @@ void Separation::FitTails() {
 
 void Separation::FitSlices(double outer) {
   TailMap fitted(header_);
-  ParallelForBlocks(header_.PointCount(), 16, thread_count_, [&](auto begin, auto end) {
-    for (std::int64_t s = begin; s < end; ++s) {
+  const RankShare share = ShareOf(header_.PointCount(), ranks_);
+  const std::int64_t own = share.end - share.begin;
+  ParallelForBlocks(own, 16, thread_count_, [&](auto begin, auto end) {
+    for (std::int64_t s = share.begin + begin; s < share.begin + end; ++s) {
       fitted.Fit(static_cast<int>(s % header_.points_x),
                  static_cast<int>(s / header_.points_x),
                  Slice(s),
@@ -279,3 +283,4 @@ void Separation::FitSlices(double outer) {
 }
 
 }  // namespace nacre::reconstruct::internal
+  fitted.Join(ranks_);

@@ -5,6 +5,7 @@
 #include "reconstruct/internal/group_spool.h"
 #include "reconstruct/internal/tails.h"
 #include "reconstruct/rd_dataset.h"
+#include "reconstruct/reconstruct.h"
 
 #include <array>
 #include <cstdint>
@@ -25,15 +26,15 @@ namespace nacre::reconstruct::internal {
 /// outside all windows.
 class Separation {
  public:
-  /// All must outlive this; `spool` holds the groups that were captured.
+  /// All but options must outlive this; `spool` holds the groups that were captured.
   Separation(const RdHeader& header,
              const acquire::Schedule& schedule,
              const GroupReader& reader,
              const GroupSpool& spool,
-             int thread_count);
+             const ReconstructOptions& options);
 
-  /// Fits the tails. Without it slices are what their pictures show, everything that
-  /// other spots lit included.
+  /// Fits the tails; collective with the options' ranks, which share slices. Without it
+  /// slices are what their pictures show, everything that other spots lit included.
   void FitTails();
 
   struct Value {
@@ -107,6 +108,7 @@ class Separation {
   int channels_;
   int thread_count_;
   bool is_dense_;
+  const Ranks* ranks_;
   double spacing_;                   // of spots, in half widths of a window
   std::vector<int> group_of_;        // by slice
   std::vector<bool> lit_;            // by slice

@@ -1,4 +1,5 @@
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "reconstruct/internal/separation.h"
 
 #include <algorithm>
@@ -32,7 +33,9 @@ void Separation::MeasureSpread() {
   };
   using Sums = std::array<Sum, kSpreadRings>;
   std::vector<Sums> sums(static_cast<std::size_t>(count * channels_));
-  ParallelFor(count * channels_, thread_count_, [&](std::int64_t n) {
+  const RankShare share = ShareOf(count * channels_, ranks_);
+  ParallelFor(share.end - share.begin, thread_count_, [&](std::int64_t k) {
+    const std::int64_t n = share.begin + k;
     const std::int64_t s = n / channels_ * header_.PointCount() / count;
     const int c = static_cast<int>(n % channels_);
     const auto slot = static_cast<std::size_t>(s);
@@ -72,6 +75,7 @@ void Separation::MeasureSpread() {
       }
     }
   });
+  JoinShares(count * channels_, ranks_, std::span(sums));
   for (int c = 0; c < channels_; ++c) {
     float last = kFirstSpread;
     for (std::size_t ring = 0; ring < kSpreadRings; ++ring) {

@@ -1,5 +1,7 @@
 #include "reconstruct/internal/tails.h"
 
+#include "core/rank_shares.h"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -68,6 +70,10 @@ void TailMap::Fit(int i, int j, const RdSlice& slice, double outer) {
       tails_[index] = FitSector(slice, c, sector, outer_mm);
     }
   }
+}
+
+void TailMap::Join(const Ranks* ranks) {
+  JoinShares(header_.PointCount(), ranks, std::span(tails_));
 }
 
 // Least squares of ln(r² R_d) = a + slope · r over rings, whose means are far enough

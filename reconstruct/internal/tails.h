@@ -6,6 +6,10 @@
 #include <cstdint>
 #include <vector>
 
+namespace nacre {
+class Ranks;
+}
+
 namespace nacre::reconstruct::internal {
 
 /// What is known of R_d beyond the windows: in each of eight directions, the outer part
@@ -25,6 +29,10 @@ class TailMap {
   /// Fits the tails of slice (i, j) from its values within `outer` (0 … 1) of the
   /// window's half width. May be called for different slices at the same time.
   void Fit(int i, int j, const RdSlice& slice, double outer);
+
+  /// Collective: of ranks' fits each has those of its share of the slices, and then
+  /// all.
+  void Join(const Ranks* ranks);
 
   /// R_d(x_i, x_o) of grid point (i, j) at the cell (du, dv) cells right of and below
   /// it: by reciprocity the light's way back is as good a witness, and knows the

@@ -74,9 +74,20 @@ Batch FinishBatch(const Separation& separation,
   return batch;
 }
 
-// Batches go to the ranks in turn.
-int OwnerOf(std::int64_t first, const Ranks* ranks) {
-  return ranks == nullptr ? 0 : static_cast<int>(first / kAtOnce % ranks->size());
+// Who works on which batch: always who has least to do, the root having to write all.
+std::vector<int> OwnersOf(std::int64_t slices, const Ranks* ranks) {
+  constexpr double kWriting = 0.3;  // of a batch's work, about
+  const std::int64_t batches = (slices + kAtOnce - 1) / kAtOnce;
+  std::vector<double> load(ranks == nullptr ? 1
+                                            : static_cast<std::size_t>(ranks->size()));
+  std::vector<int> owners;
+  for (std::int64_t batch = 0; batch < batches; ++batch) {
+    const auto least = std::min_element(load.begin(), load.end());
+    owners.push_back(static_cast<int>(least - load.begin()));
+    *least += 1;
+    load[0] += kWriting;
+  }
+  return owners;
 }
 
 std::string Pack(const Batch& batch) {
@@ -121,8 +132,9 @@ void SendSlices(const Separation& separation,
                 const ReconstructOptions& options,
                 const ProgressFunction& progress) {
   const std::int64_t total = finishing.header.PointCount();
+  const std::vector<int> owners = OwnersOf(total, options.ranks);
   for (std::int64_t first = 0; first < total; first += kAtOnce) {
-    if (OwnerOf(first, options.ranks) == options.ranks->rank()) {
+    if (owners[static_cast<std::size_t>(first / kAtOnce)] == options.ranks->rank()) {
       Report(progress, {"reconstruct", first, total, "slices"});
       std::string bytes = Pack(FinishBatch(separation, finishing, options, first));
       options.ranks->Flush();  // no more than one on its way and one being made
@@ -140,13 +152,14 @@ void WriteSlices(const Separation& separation,
                  const ProgressFunction& progress) {
   const std::int64_t total = finishing.header.PointCount();
   const int width = finishing.header.points_x;
+  const std::vector<int> owners = OwnersOf(total, options.ranks);
   SymmetrizeChange change;
   ExposureAdvice::Counts dim;
   Batch written;
   std::future<void> writing;  // declared last: it is waited for before `written` goes
   for (std::int64_t first = 0; first < total; first += kAtOnce) {
     Report(progress, {"reconstruct", first, total, "slices"});
-    const int owner = OwnerOf(first, options.ranks);
+    const int owner = owners[static_cast<std::size_t>(first / kAtOnce)];
     Batch batch = owner == 0 ? FinishBatch(separation, finishing, options, first)
                              : Unpack(options.ranks->Receive(kTag, owner).bytes,
                                       finishing.header);

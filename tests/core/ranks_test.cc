@@ -2,11 +2,13 @@
 
 #include "core/lot_sum.h"
 #include "core/random.h"
+#include "core/rank_shares.h"
 #include "tests/support/thread_ranks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -103,6 +105,48 @@ TEST(LotSum, HasTheSameBitsForAnyNumberOfRanks) {
     }
   }
   EXPECT_THAT(SumOf(0, nullptr), IsEmpty());
+}
+
+TEST(SumInOrder, HasTheBitsOfALoop) {
+  constexpr std::int64_t kCount = 6;
+  std::vector<std::vector<float>> vectors;
+  std::vector<float> expected(5, 0.0F);
+  for (std::int64_t n = 0; n < kCount; ++n) {
+    auto& vector = vectors.emplace_back();
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      vector.push_back(1 /
+                       static_cast<float>(1 + 7 * n + static_cast<std::int64_t>(k)));
+      expected[k] += vector.back();
+    }
+  }
+  for (const int size : {1, 2, 3, 4, 8}) {
+    OnThreadRanks(size, [&](const Ranks& ranks) {
+      const RankShare share = ShareOf(kCount, &ranks);
+      const std::vector<std::span<const float>> own(vectors.begin() + share.begin,
+                                                    vectors.begin() + share.end);
+      std::vector<float> total(expected.size(), 5.0F);
+      SumInOrder<float>(kCount, own, &ranks, total);
+      EXPECT_EQ(total, expected) << size;
+    });
+  }
+  std::vector<float> nothing(2, 5.0F);
+  SumInOrder<float>(0, {}, nullptr, nothing);
+  EXPECT_EQ(nothing, std::vector<float>(2, 0.0F));
+}
+
+TEST(JoinShares, GivesAllRowsToAll) {
+  const std::vector<int> all{1, 2, 3, 4, 5, 6, 7, 8, 9, 10};  // five rows of two
+  for (const int size : {1, 2, 3, 7}) {
+    OnThreadRanks(size, [&](const Ranks& ranks) {
+      std::vector<int> values(all.size(), 0);
+      const RankShare share = ShareOf(5, &ranks);
+      std::copy(all.begin() + 2 * share.begin,
+                all.begin() + 2 * share.end,
+                values.begin() + 2 * share.begin);
+      JoinShares(5, &ranks, std::span(values));
+      EXPECT_EQ(values, all) << size;
+    });
+  }
 }
 
 TEST(Ranks, TheLauncherIsFoundInTheEnvironment) {

@@ -66,6 +66,34 @@ TEST(OneReading, GivesTheSameMaterialOnAnyNumberOfRanks) {
   }
 }
 
+// Few slices, read several times: the reciprocal model, and what is found the best.
+TEST(Factor, GivesTheSameMaterialOnAnyNumberOfRanks) {
+  const RdDataset few =
+      MakeChessboard({.points_x = 14, .points_y = 11, .core = 7, .noise = 0.01});
+  const nacre::testing::TempFolder folder;
+  for (const char* method : {"reciprocal", "auto"}) {
+    FactorOptions options{.method = method, .terms = 2};
+    options.thread_count = 1;
+    const Factorization alone = Factor(few, options);
+    WriteMaterial(folder / "alone.nacre.exr", alone.material);
+    const bool is_auto = options.method == "auto";
+    for (const int size : {2, is_auto ? 3 : 9}) {  // 9: more than sums are dealt to
+      nacre::testing::OnThreadRanks(size, [&](const Ranks& ranks) {
+        FactorOptions its = options;
+        its.ranks = &ranks;
+        const Factorization shared = Factor(few, its);
+        const auto file = folder / fmt::format("{}.nacre.exr", ranks.rank());
+        WriteMaterial(file, shared.material);
+        EXPECT_TRUE(ReadFile(file) == ReadFile(folder / "alone.nacre.exr"))
+            << method << " on " << size;
+        EXPECT_EQ(shared.summary.worst_slice, alone.summary.worst_slice);
+        EXPECT_EQ(shared.summary.log_rms, alone.summary.log_rms);
+        EXPECT_EQ(shared.summary.invariants.slices > 0, ranks.IsRoot());
+      });
+    }
+  }
+}
+
 TEST(RowScans, AreThoseOfASlowLoop) {
   const RdDataset& dataset = Large();
   internal::RowScans rows(3, 100);

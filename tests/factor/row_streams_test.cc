@@ -111,8 +111,8 @@ TEST(ReciprocalTotals, AreTheSumsOfWindows) {
   m.row_scale[12] = 0.75F;
   m.albedo.assign(m.row_scale.size(), 0.0F);
   Validate(m, "made here");
-  const std::vector<double> totals = ReciprocalTotals(m, 2);
-  EXPECT_EQ(totals, ReciprocalTotals(m, 1));
+  const std::vector<double> totals = ReciprocalTotals(m, {.thread_count = 2});
+  EXPECT_EQ(totals, ReciprocalTotals(m, {.thread_count = 1}));
   std::vector<float> window(static_cast<std::size_t>(m.WindowSize()));
   for (int c = 0; c < 2; ++c) {
     for (int n = 0; n < m.PointCount(); ++n) {

@@ -14,6 +14,9 @@ import tempfile
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "faults"))
+import line  # noqa: E402
+
 PHANTOM = """channels = ["R", "G"]
 [slab]
 thickness_mm = 10.0
@@ -62,6 +65,7 @@ SCENE = """<scene version="0.6.0">
 SIMULATE = ["simulate", "phantom.toml", "--threads", "1", "--out", "o.rd.exr", "--solver"]
 RENDER = ["render", "ball.xml", "--threads", "1", "--out", "o.exr", "--max-lit-points", "3000", "--no-lazy"]
 DATA = "data.rd.exr"  # simulated before the rest
+SESSION = "session"  # captured
 
 # What is run under 2 ranks, under 4, and alone; and what it writes.
 COMMANDS = [
@@ -70,11 +74,22 @@ COMMANDS = [
       "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
     (["factor", DATA, "--method", "nmf", "--terms", "2", "--threads", "1",
       "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
+    (["factor", DATA, "--method", "reciprocal", "--terms", "2", "--sides", "1", "--threads", "1",
+      "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
+    (["reconstruct", SESSION, "--calibration", "c.json", "--threads", "1", "--out", "o.rd.exr"],
+     "o.rd.exr"),
     (SIMULATE + ["fast"], "o.rd.exr"),
     (SIMULATE + ["mc", "--photons", "3000"], "o.rd.exr"),
     (SIMULATE + ["mc", "--beam", "1,0", "--error", "0.9"], "o.rd.exr"),
     (RENDER + ["--lazy", "--adaptive", "--spp", "20"], "o.exr"),
     (RENDER + ["--reference", "--spp", "2"], "o.exr"),
+]
+
+# What works with devices and what is soon done is for one process.
+ALONE = [
+    ["capture", "rig.toml", "--out", "another"],
+    ["calibrate", SESSION, "--out", "another"],
+    ["edit", DATA, "--out", "another"],
 ]
 
 # A picture that takes seconds (a kill takes half of one to be heard of), and shows itself after its first passes.
@@ -90,6 +105,10 @@ class Runner:
         self.failures = []
         (self.folder / "phantom.toml").write_text(PHANTOM)
         (self.folder / "ball.xml").write_text(SCENE)
+        grid = ("[8, 8]", "[12, 12]")  # slices of several batches
+        (self.folder / "rig.toml").write_text(line.RIG.format(size=160).replace(*grid))
+        grey = line.PHANTOM.format(channels='"R"', a="0.02", s="2.2")
+        (self.folder / "grey.toml").write_text(grey.replace(*grid))
 
     def start(self, ranks, arguments):
         launch = [] if ranks == 1 else [
@@ -111,8 +130,11 @@ class Runner:
             print("FAILED:", what, flush=True)
 
     def same_bytes(self):
-        code, _, err = self.run(1, ["simulate", "phantom.toml", "--solver", "fast", "--out", DATA])
-        self.check(code == 0, f"simulate: {code} {err}")
+        for arguments in (["simulate", "phantom.toml", "--solver", "fast", "--out", DATA],
+                          ["capture", "rig.toml", "--out", SESSION],
+                          ["calibrate", SESSION, "--out", "c.json"]):
+            code, _, err = self.run(1, arguments)
+            self.check(code == 0, f"{arguments}: {code} {err}")
         for arguments, written in COMMANDS:
             name = " ".join(arguments)
             made = {}
@@ -133,6 +155,14 @@ class Runner:
         alone, _, _ = self.run(1, ["simulate", "nothing.toml", "--out", "o.rd.exr"])
         self.check(code == alone != 0, f"exit code {code} for a missing file, {alone} alone")
         self.check("nothing.toml" in err, f"no word of nothing.toml: {err}")
+
+    def refused(self):
+        """One line, the exit code of a usage error, and nothing is written."""
+        for arguments in ALONE:
+            code, out, err = self.run(2, arguments)
+            self.check(code == 2 and not out, f"{arguments} under 2: {code} {out}")
+            self.check("run it without mpirun" in err, f"{arguments} under 2: {err}")
+            self.check(not (self.folder / "another").exists(), f"{arguments} under 2 wrote")
 
     def killed(self):
         """SIGKILL of a rank, then the same command again: the bytes of a picture made in one go."""
@@ -179,6 +209,7 @@ def main():
         runner = Runner(str(Path(nacre).resolve()), mpirun, folder)
         runner.same_bytes()
         runner.one_error()
+        runner.refused()
         runner.killed()
     print(f"{len(runner.failures)} failures")
     return 1 if runner.failures else 0

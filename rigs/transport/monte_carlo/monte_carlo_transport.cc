@@ -173,37 +173,49 @@ Result MonteCarloTransport::Run(Simulation& simulation,
   }
 }
 
+MonteCarloTransport::Task MonteCarloTransport::TaskAt(
+    PointMm x_i, std::size_t channel, const TallyRequest& request) const {
+  RequireFinite(x_i);
+  const PointMm near = NearOrigin(volumes_[channel], x_i);
+  TallyRequest moved = request;
+  moved.window_centre = {near.x + (request.window_centre.x - x_i.x),
+                         near.y + (request.window_centre.y - x_i.y)};
+  return {SourceAt(near), channel, moved};
+}
+
+Result MonteCarloTransport::Solve(const Task& task,
+                                  const Ranks* ranks,
+                                  const ProgressFunction& progress) const {
+  Options options = options_;
+  options.seed = SeedOf(options_.seed, task.channel, task.source.centre);
+  options.ranks = ranks;
+  const Volume& volume = volumes_[task.channel];
+  Simulation simulation(
+      volume, SharedAtBorders(task.source, volume.pattern), task.request, options);
+  return Run(simulation, progress ? progress : progress_);
+}
+
 Result MonteCarloTransport::Simulate(PointMm x_i,
                                      std::size_t channel,
                                      const TallyRequest& request,
                                      const ProgressFunction& progress) const {
-  RequireFinite(x_i);
-  const Volume& volume = volumes_[channel];
-  const PointMm near = NearOrigin(volume, x_i);
-  TallyRequest moved = request;
-  moved.window_centre = {near.x + (request.window_centre.x - x_i.x),
-                         near.y + (request.window_centre.y - x_i.y)};
-  return SimulateLight(SourceAt(near), channel, moved, progress);
+  return Solve(TaskAt(x_i, channel, request), ranks(), progress);
 }
 
 Result MonteCarloTransport::SimulateLight(const Source& source,
                                           std::size_t channel,
                                           const TallyRequest& request,
                                           const ProgressFunction& progress) const {
-  Options options = options_;
-  options.seed = SeedOf(options_.seed, channel, source.centre);
-  const Volume& volume = volumes_[channel];
-  Simulation simulation(
-      volume, SharedAtBorders(source, volume.pattern), request, options);
-  return Run(simulation, progress ? progress : progress_);
+  return Solve({source, channel, request}, ranks(), progress);
 }
 
 Window MonteCarloTransport::WindowAround(PointMm x_i) const {
-  return WindowAround(x_i, {});
+  return WindowBy(x_i, ranks(), {});
 }
 
-Window MonteCarloTransport::WindowAround(PointMm x_i,
-                                         const ProgressFunction& progress) const {
+Window MonteCarloTransport::WindowBy(PointMm x_i,
+                                     const Ranks* ranks,
+                                     const ProgressFunction& progress) const {
   Expect(phantom_.grid.points_x > 0, "a phantom with a grid");
   const TallyRequest request{.window_centre = x_i,
                              .window_core = phantom_.grid.core,
@@ -212,8 +224,9 @@ Window MonteCarloTransport::WindowAround(PointMm x_i,
   Window window;
   const auto channels = static_cast<std::int64_t>(volumes_.size());
   for (std::int64_t c = 0; c < channels; ++c) {
-    const Result result = Simulate(
-        x_i, static_cast<std::size_t>(c), request, PartOf(progress, c, channels));
+    const Result result = Solve(TaskAt(x_i, static_cast<std::size_t>(c), request),
+                                ranks,
+                                PartOf(progress, c, channels));
     for (const Estimate& cell : result.window_per_mm2) {
       window.rd.push_back(static_cast<float>(cell.mean));
       window.sigma.push_back(static_cast<float>(cell.se));
@@ -222,17 +235,42 @@ Window MonteCarloTransport::WindowAround(PointMm x_i,
   return window;
 }
 
+// Counts of a beam's photons are summed over all ranks if these share them, which is
+// more than a window of R_d: so beams go to ranks as long as there are enough.
 void MonteCarloTransport::SolveWindows(
     std::span<const PointMm> points,
     const std::function<void(std::size_t k, Window&& window)>& use,
     const ProgressFunction& progress) const {
+  constexpr int kTag = 31;
   const auto count = static_cast<std::int64_t>(points.size());
+  const int size = ranks() == nullptr ? 1 : ranks()->size();
+  const int rank = ranks() == nullptr ? 0 : ranks()->rank();
+  const std::int64_t by_rank = size == 1 ? 0 : count / size * size;
   for (std::int64_t k = 0; k < count; ++k) {
     const auto at = static_cast<std::size_t>(k);
-    Window window = WindowAround(points[at], PartOf(progress, k, count));
-    if (ranks() == nullptr || ranks()->IsRoot()) {
-      use(at, std::move(window));
+    const int owner = static_cast<int>(k % size);
+    const bool is_shared = k >= by_rank;
+    Window window;
+    if (is_shared || owner == rank) {
+      window = WindowBy(
+          points[at], is_shared ? ranks() : nullptr, PartOf(progress, k, count));
     }
+    if (!is_shared && owner == rank && rank != 0) {
+      ranks()->Flush();  // no more than one on its way
+      ranks()->Post(0,
+                    kTag,
+                    ToBytes(std::span<const float>(window.rd)) +
+                        ToBytes(std::span<const float>(window.sigma)));
+    }
+    if (rank != 0) {
+      continue;
+    }
+    if (!is_shared && owner != 0) {
+      const auto values = FromBytes<float>(ranks()->Receive(kTag, owner).bytes);
+      const auto half = values.begin() + std::ssize(values) / 2;
+      window = {{values.begin(), half}, {half, values.end()}};
+    }
+    use(at, std::move(window));
   }
 }
 

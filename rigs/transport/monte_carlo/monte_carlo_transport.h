@@ -42,7 +42,8 @@ class MonteCarloTransport final : public Transport {
   /// makes equal share their photons.
   Window WindowAround(PointMm x_i) const override;
 
-  /// One after the other; the photons of each on all threads.
+  /// The photons of each on all threads; of several ranks each takes every n-th point,
+  /// and they share the photons of those that are left.
   void SolveWindows(std::span<const PointMm> points,
                     const std::function<void(std::size_t k, Window&& window)>& use,
                     const ProgressFunction& progress = {}) const override;
@@ -78,7 +79,20 @@ class MonteCarloTransport final : public Transport {
  private:
   double FindReachMm(std::size_t channel) const;
   Result Run(Simulation& simulation, const ProgressFunction& progress) const;
-  Window WindowAround(PointMm x_i, const ProgressFunction& progress) const;
+  // A beam of one channel, and what is asked of it.
+  struct Task {
+    Source source;
+    std::size_t channel;
+    TallyRequest request;
+  };
+  Task TaskAt(PointMm x_i, std::size_t channel, const TallyRequest& request) const;
+  // By those ranks together, or, without, by this process alone.
+  Result Solve(const Task& task,
+               const Ranks* ranks,
+               const ProgressFunction& progress) const;
+  Window WindowBy(PointMm x_i,
+                  const Ranks* ranks,
+                  const ProgressFunction& progress) const;
 
   Phantom phantom_;
   Options options_;
