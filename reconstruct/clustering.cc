@@ -1,5 +1,6 @@
 #include "reconstruct/clustering.h"
 
+#include "core/error.h"
 #include "core/parallel.h"
 #include "core/ranks.h"
 #include "reconstruct/internal/gap_statistic.h"
@@ -7,6 +8,8 @@
 #include "reconstruct/internal/slice_features.h"
 
 #include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
 #include <functional>
 #include <map>
 
@@ -121,11 +124,42 @@ Clustering Cluster(const RdHeader& header,
   return clustering;
 }
 
+// As files are checked when they are read; what isn't valid may be anything.
+void CheckFinite(const RdDataset& dataset) {
+  const RdHeader& header = dataset.header;
+  const auto values =
+      static_cast<std::size_t>(header.PointCount() * header.SliceSize());
+  Expect(dataset.rd.size() == values && dataset.sigma.size() == values &&
+             dataset.valid.size() == values,
+         "points * channels * core * core values");
+  for (std::size_t n = 0; n < values; ++n) {
+    if (dataset.valid[n] == 0 ||
+        (std::isfinite(dataset.rd[n]) && std::isfinite(dataset.sigma[n]))) {
+      continue;
+    }
+    const auto at = static_cast<std::int64_t>(n);
+    const std::int64_t slice = at / header.SliceSize();
+    const std::int64_t cell = at % header.WindowSize();
+    throw BadData(fmt::format(
+        "slice ({}, {}), channel {}, window cell ({}, {}): R_d is {} +- {}; mark "
+        "what wasn't measured as invalid",
+        slice % header.points_x,
+        slice / header.points_x,
+        header.channels[static_cast<std::size_t>(at % header.SliceSize() /
+                                                 header.WindowSize())],
+        cell % header.core,
+        cell / header.core,
+        dataset.rd[n],
+        dataset.sigma[n]));
+  }
+}
+
 }  // namespace
 
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,
                          const ProgressFunction& progress) {
+  CheckFinite(dataset);
   const auto size = static_cast<std::size_t>(dataset.header.SliceSize());
   const auto view = [&](std::int64_t s, RdSlice&) {
     const std::size_t begin = static_cast<std::size_t>(s) * size;

@@ -59,7 +59,8 @@ struct Clustering {
 /// k-means++ seeds [Arthur07] on principal components of the noise-weighted
 /// ln(R'_d / peak + offset), all channels (reconstruct/README.md). The same for any
 /// number of threads and ranks; each rank reads its share of the slices and the sample,
-/// and runs its share of the restarts.
+/// and runs its share of the restarts. Throws BadData naming slice, channel and cell of
+/// a valid value that isn't finite.
 Clustering ClusterSlices(const RdDataset& dataset,
                          const ClusterOptions& options,
                          const ProgressFunction& progress = {});

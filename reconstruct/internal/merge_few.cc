@@ -66,7 +66,10 @@ template <std::size_t kCount>
     for (std::size_t b = 0; b < kCount; ++b) {
       const float t = all[b].exposure_us;
       const float expected = pooled * t;
-      const float d = (expected * noise.slope + all[b].floor) * noise.Stretch(expected);
+      const float there =
+          (expected * noise.slope + all[b].floor) * noise.Stretch(expected);
+      // Far beyond saturation the response is nothing to count on, nor a float.
+      const float d = uses[b] > 0 ? there : 1.0F;
       const float n = uses[b] * ((t / longest_us) * (t / longest_us)) * product;
       weights = weights * d + n;
       weighted = weighted * d + n * (above[b] * (1 / t));

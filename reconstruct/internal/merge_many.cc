@@ -54,9 +54,10 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddWeighted(
   for (std::size_t k = 0; k < count; ++k) {
     const float one = sums.used[k] > bracket.order ? 1.0F : 0.0F;
     const float expected = sums.pooled_rate[k] * t;
-    const float weight =
-        one * t * t /
-        ((expected * noise.slope + bracket.floor) * noise.Stretch(expected));
+    const float there =
+        (expected * noise.slope + bracket.floor) * noise.Stretch(expected);
+    const float d = one > 0 ? there : 1.0F;
+    const float weight = one * t * t / d;
     const float above =
         noise.Linear(static_cast<float>(bracket.counts[k]) - bracket.dark_counts);
     sums.weight[k] += weight;

@@ -48,7 +48,7 @@ void AddSystematics(const RdHeader& header,
     const double row =
         calibration.RdPerRate(static_cast<int>(c), {0, 0}, {0, 0}, header.eta) *
         calibration.corrections.row_noise_counts / longest_us;
-    const auto row2 = static_cast<float>(row * row / rows);
+    const double row2 = row * row / rows;  // no float, if R_d is of another unit
     const auto off2 = static_cast<float>(off * off);
     const Window window{std::span(slice.rd).subspan(c * window_size, window_size),
                         header.core};
@@ -62,8 +62,10 @@ void AddSystematics(const RdHeader& header,
         const float along_x = window.LogSlope(cell, 1, u);
         const float along_y = window.LogSlope(cell, header.core, v);
         const float relative2 = scale2 + off2 * (along_x * along_x + along_y * along_y);
-        slice.sigma[at] = std::sqrt(slice.sigma[at] * slice.sigma[at] + row2 +
-                                    relative2 * slice.rd[at] * slice.rd[at]);
+        const auto sigma = static_cast<double>(slice.sigma[at]);
+        const auto rd = static_cast<double>(slice.rd[at]);
+        slice.sigma[at] = static_cast<float>(
+            std::sqrt(sigma * sigma + row2 + static_cast<double>(relative2) * rd * rd));
       }
     }
   }

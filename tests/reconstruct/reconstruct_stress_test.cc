@@ -7,6 +7,7 @@
 #include "reconstruct/rd_dataset.h"
 #include "reconstruct/reciprocity.h"
 #include "tests/reconstruct/datasets.h"
+#include "tests/support/error_message.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -45,7 +46,7 @@ RdDataset Stripes(double scale, int points_x = 9, int points_y = 7, int core = 1
       for (int v = -radius; v <= radius; ++v) {
         for (int u = -radius; u <= radius; ++u) {
           const double r = std::hypot(u, v);
-          const double decades = odd ? 12 * r / (1.42 * radius) : 6 * r / radius;
+          const double decades = (odd ? 12 * r / 1.42 : 6 * r) / std::max(1, radius);
           dataset.rd.push_back(
               static_cast<float>(scale * std::pow(10, -decades * shade)));
           dataset.sigma.push_back(1e-3F * dataset.rd.back());
@@ -138,6 +139,24 @@ TEST(ReconstructStress, SmallestGridsAndHalvesThatWereNotMeasured) {
   EXPECT_EQ(ClusterSlices(half, kTwo).labels, ClusterSlices(Stripes(1), kTwo).labels);
   std::fill(half.valid.begin(), half.valid.end(), std::uint8_t{0});
   EXPECT_EQ(ClusterSlices(half, kTwo).cluster_count, 1);
+}
+
+TEST(ReconstructStress, NotANumberIsRefusedAndNamedUnlessMasked) {
+  const Clustering plain = ClusterSlices(Stripes(1), kTwo);
+  for (const float bad : {std::numeric_limits<float>::quiet_NaN(),
+                          std::numeric_limits<float>::infinity(),
+                          -std::numeric_limits<float>::infinity()}) {
+    for (const bool in_sigma : {false, true}) {
+      RdDataset dataset = Stripes(1);
+      // Slice (3, 1), channel G, cell (2, 4).
+      const std::size_t at = (1 * 9 + 3) * 338 + 169 + 4 * 13 + 2;
+      (in_sigma ? dataset.sigma : dataset.rd)[at] = bad;
+      EXPECT_THAT(nacre::testing::ErrorMessage([&] { ClusterSlices(dataset, kTwo); }),
+                  ::testing::HasSubstr("slice (3, 1), channel G, window cell (2, 4)"));
+      dataset.valid[at] = 0;
+      EXPECT_EQ(ClusterSlices(dataset, kTwo).labels, plain.labels) << bad;
+    }
+  }
 }
 
 // Sums against long double, over 12 decades.
