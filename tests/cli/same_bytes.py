@@ -4,8 +4,10 @@
     same_bytes.py NACRE                       threads, OpenBLAS's threads
     same_bytes.py NACRE --quick               three threads, without what takes longest
     same_bytes.py NACRE --only factor         commands whose names have that word
-    same_bytes.py NACRE --cpu                 processors with fewer instructions too
-    same_bytes.py NACRE --other NACRE2        another build
+    same_bytes.py NACRE --cpu                 libraries told to use fewer instructions too
+    same_bytes.py NACRE --processors          other processors too, by qemu-user
+    same_bytes.py NACRE --other NACRE2        another build (any number of them)
+    same_bytes.py NACRE --no-threads          not the threads
 
 prints a table and exits with 1 if anything differs that may not.
 """
@@ -14,6 +16,7 @@ import argparse
 import json
 import math
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -38,6 +41,9 @@ CPU = {
     "OpenCV: SSE3": (1, {"OPENCV_CPU_DISABLE": "SSE4_1,SSE4_2,AVX,FP16,AVX2,AVX512_SKX"}),
     "Embree: SSE2": (1, {"NACRE_TEST_EMBREE": "isa=sse2"}),
 }
+
+# What the whole command runs on: without AVX, and with AVX2 and FMA but no AVX-512.
+PROCESSORS = ["Nehalem", "Haswell"]
 
 
 def commands(line):
@@ -128,25 +134,46 @@ def compare(nacre, reference, made):
     return worst if worst else "same"
 
 
-def main():
-    parser = argparse.ArgumentParser()
-    parser.add_argument("nacre")
-    parser.add_argument("--cpu", action="store_true")
-    parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--only", default="")
-    parser.add_argument("--other", help="another build of it")
-    parser.add_argument("--bound", type=float, default=0, help="relative difference that --cpu and --other may make")
-    arguments = parser.parse_args()
-    nacre = os.path.abspath(arguments.nacre)
-    ways = {name: (*way, None) for name, way in THREADS.items()}
+def emulated(nacre, processor, folder):
+    """The command on another processor: every choice of instructions is another one."""
+    qemu = shutil.which("qemu-x86_64")
+    if qemu is None:
+        raise SystemExit("--processors needs qemu-x86_64 (Debian: qemu-user)")
+    script = Path(folder) / processor
+    script.write_text(f'#!/bin/sh\nexec {qemu} -cpu {processor} {nacre} "$@" 2>/dev/null\n')
+    script.chmod(0o755)
+    return str(script)
+
+
+def chosen_ways(arguments, nacre, folder):
+    """{column: (threads, environment, command or None)}"""
+    ways = {} if arguments.no_threads else {name: (*way, None) for name, way in THREADS.items()}
     if arguments.quick:
         del ways["2 threads"]
     if arguments.cpu:
         ways.update({name: (*way, None) for name, way in CPU.items()})
-    if arguments.other:
-        ways["other build"] = (1, {}, os.path.abspath(arguments.other))
+    if arguments.processors:
+        ways.update({name: (1, {}, emulated(nacre, name, folder)) for name in PROCESSORS})
+    for other in arguments.other:
+        ways[Path(other).resolve().parent.name] = (1, {}, os.path.abspath(other))
+    return ways
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("nacre")
+    parser.add_argument("--cpu", action="store_true")
+    parser.add_argument("--processors", action="store_true")
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--no-threads", action="store_true")
+    parser.add_argument("--only", default="")
+    parser.add_argument("--other", action="append", default=[], help="another build of it")
+    parser.add_argument("--bound", type=float, default=0, help="relative difference that all but threads may make")
+    arguments = parser.parse_args()
+    nacre = os.path.abspath(arguments.nacre)
     failed = 0
     with tempfile.TemporaryDirectory() as scratch:
+        ways = chosen_ways(arguments, nacre, scratch)
         line = Line(nacre, Path(scratch) / "inputs")
         write_npy(line.folder / "scan.npy")
         print("| command | " + " | ".join(ways) + " |\n|---|" + "---|" * len(ways))
