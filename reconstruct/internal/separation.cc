@@ -89,9 +89,10 @@ Separation::Node Separation::NodeOf(int u) const {
 }
 
 Separation::Foreign Separation::Mix(const Foreign& a, const Foreign& b, float second) {
+  const auto t = static_cast<double>(second);
   return {std::lerp(a.light, b.light, second),
-          std::lerp(a.variance, b.variance, second),
-          std::lerp(a.square, b.square, second),
+          std::lerp(a.variance, b.variance, t),
+          std::lerp(a.square, b.square, t),
           a.hides};
 }
 
@@ -131,9 +132,10 @@ Separation::Foreign Separation::ForeignAt(
       continue;
     }
     const float light = tails_.Extrapolate(other.i, other.j, channel, du, dv);
-    const float off = SpreadAt(channel, du, dv) * light;
+    const auto wide = static_cast<double>(light);
+    const double off = static_cast<double>(SpreadAt(channel, du, dv)) * wide;
     foreign.light += light;
-    foreign.square += light * light;
+    foreign.square += wide * wide;
     foreign.variance += off * off;
     foreign.hides = foreign.hides || du * du + dv * dv < inner2;
   }
@@ -153,7 +155,7 @@ Separation::Value Separation::ValueOf(
   }
   const float enter = EnterFactor(s, channel);
   const float seen = spool_.Rd(group)[at] * enter;
-  const float noise2 = noise * enter * noise * enter;
+  const double noise2 = std::pow(static_cast<double>(noise * enter), 2);
   if (!has_tails_) {
     return {seen, noise2, 0};
   }
@@ -168,14 +170,15 @@ Separation::Value Separation::ValueOf(
   if (!(own > 0)) {
     return {seen - other.light, noise2 + other.variance, other.light};
   }
-  const float own_off = SpreadAt(channel, du, dv) * own;
-  const float own2 = own_off * own_off;
+  const auto own_off = static_cast<double>(SpreadAt(channel, du, dv) * own);
+  const double own2 = own_off * own_off;
   if (other.hides) {
     return {own, own2, seen - own};
   }
-  const float rest2 = other.variance + noise2;
-  const float rd = own + own2 / (own2 + rest2) * (seen - own - other.light);
-  return {rd, own2 * rest2 / (own2 + rest2), seen - rd};
+  const double rest2 = other.variance + noise2;
+  const double share = own2 / (own2 + rest2);
+  const float rd = own + static_cast<float>(share) * (seen - own - other.light);
+  return {rd, share * rest2, seen - rd};
 }
 
 Separation::Value Separation::At(std::int64_t s, int channel, int u, int v) const {
@@ -240,7 +243,8 @@ RdSlice Separation::Slice(std::int64_t s, double* share) const {
                                         Mix(row(y.first), row(y.next), y.second)));
         slice.valid[at] = value.variance < 0 ? 0 : 1;
         slice.rd[at] = value.rd;
-        slice.sigma[at] = value.variance < 0 ? 0.0F : std::sqrt(value.variance);
+        slice.sigma[at] =
+            value.variance < 0 ? 0.0F : static_cast<float>(std::sqrt(value.variance));
         total += static_cast<double>(value.rd);
         taken += static_cast<double>(value.foreign);
       }
@@ -279,8 +283,8 @@ void Separation::FitSlices(double outer) {
                  outer);
     }
   });
+  fitted.Join(ranks_);
   tails_ = std::move(fitted);
 }
 
 }  // namespace nacre::reconstruct::internal
-  fitted.Join(ranks_);

@@ -39,8 +39,8 @@ class Separation {
 
   struct Value {
     float rd = 0;
-    float variance = -1;  ///< below 0: not measured
-    float foreign = 0;    ///< of other spots, taken away
+    double variance = -1;  ///< below 0: not measured
+    float foreign = 0;     ///< of other spots, taken away
   };
   /// R_d(x_i, x_i + d) of slice s and window cell (u, v).
   Value At(std::int64_t s, int channel, int u, int v) const;
@@ -71,11 +71,12 @@ class Separation {
     float sigma;
   };
 
-  // The light of a picture's other spots in a window cell.
+  // The light of a picture's other spots in a window cell. Squares are doubles: those
+  // of what is below 1e-19 or above 1e19 mm⁻² are no floats.
   struct Foreign {
     float light = 0;
-    float variance = 0;
-    float square = 0;    // Σ light² of the spots
+    double variance = 0;
+    double square = 0;   // Σ light² of the spots
     bool hides = false;  // the cell is in another spot's inner part
   };
   // The other spots of a slice's picture. What those nearby shine into a window is
@@ -107,8 +108,8 @@ class Separation {
   CellLattice lattice_;
   int channels_;
   int thread_count_;
-  bool is_dense_;
   const Ranks* ranks_;
+  bool is_dense_;
   double spacing_;                   // of spots, in half widths of a window
   std::vector<int> group_of_;        // by slice
   std::vector<bool> lit_;            // by slice

@@ -65,7 +65,7 @@ void Separation::MeasureSpread() {
         }
         const double off = static_cast<double>(spool_.Rd(group)[cell]) * enter - own -
                            static_cast<double>(other.light);
-        const double light2 = own * own + static_cast<double>(other.square);
+        const double light2 = own * own + other.square;
         const double weight =
             1 / std::pow(noise * noise + kTypical * kTypical * light2, 2);
         Sum& sum =

@@ -34,14 +34,14 @@ SymmetrizeChange Symmetrize(const RdHeader& header,
         }
         const Separation::Value back = separation.At(
             std::int64_t{to_j} * header.points_x + to_i, c, last - u, last - v);
-        const float variance = slice.sigma[at] * slice.sigma[at];
+        const double variance = std::pow(static_cast<double>(slice.sigma[at]), 2);
         if (back.variance < 0 || !(variance + back.variance > 0)) {
           continue;
         }
-        const float weight = variance / (variance + back.variance);
-        const float step = weight * (back.rd - slice.rd[at]);
+        const double weight = variance / (variance + back.variance);
+        const float step = static_cast<float>(weight) * (back.rd - slice.rd[at]);
         slice.rd[at] += step;
-        slice.sigma[at] = std::sqrt(weight * back.variance);
+        slice.sigma[at] = static_cast<float>(std::sqrt(weight * back.variance));
         difference += static_cast<double>(step);
         change.changed += static_cast<double>(std::abs(step));
       }
