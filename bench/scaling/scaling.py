@@ -47,24 +47,31 @@ class Bench:
             os.environ, OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1",
             OPENBLAS_NUM_THREADS="1")
 
-    def run(self, arguments, ranks):
-        """Seconds of the wall, CPU-seconds of all and of the busiest rank, its messages."""
+    def start(self, arguments, ranks):
         launch = [] if ranks == 1 else [
             self.mpirun, "-n", str(ranks), "--oversubscribe", "--bind-to", "none"]
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        start = time.monotonic()
-        result = subprocess.run(launch + [self.nacre, *arguments, "-v", "--threads", "1"],
+        return subprocess.Popen(launch + [self.nacre, *arguments, "-v", "--threads", "1"],
                                 cwd=self.folder, env=self.environment, text=True,
-                                capture_output=True, check=False)
-        wall = time.monotonic() - start
+                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+
+    def run(self, arguments, ranks, copies=1):
+        """Seconds of the wall, CPU-seconds of all and of the busiest rank, its messages; of
+        `copies` that run side by side (the arguments have a place for the copy's number)."""
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        begin = time.monotonic()
+        running = [self.start([a.replace("#", str(k)) for a in arguments], ranks)
+                   for k in range(copies)]
+        said = [process.communicate()[1] for process in running]
+        wall = time.monotonic() - begin
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        if result.returncode != 0:
-            raise SystemExit(f"{arguments} under {ranks}: {result.stderr}")
+        if any(process.returncode != 0 for process in running):
+            raise SystemExit(f"{arguments} under {ranks}: {said}")
         cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        cpu /= copies
         row = {"ranks": ranks, "wall": wall, "cpu": cpu, "busiest": cpu, "bytes": 0, "messages": 0}
-        said = re.search(r"^ranks: (\{.*\})$", result.stderr, re.M)
-        if said:
-            traffic = json.loads(said.group(1))
+        told = re.search(r"^ranks: (\{.*\})$", said[0], re.M)
+        if told:
+            traffic = json.loads(told.group(1))
             row.update(busiest=max(traffic["cpu_seconds_by_rank"]),
                        cpu=sum(traffic["cpu_seconds_by_rank"]),
                        bytes=max(traffic["bytes_by_rank"]),
@@ -73,15 +80,20 @@ class Bench:
         return row
 
     def measure(self, case):
+        """One process has a copy of itself beside it, as a rank has another: each of two busy
+        cores is slower than one that is busy alone."""
         rows = []
         for size, (label, arguments) in zip(case["sizes"], case["runs"]):
             digests = set()
+            out = self.folder / ("0" + case["out"])
+            command = [*arguments, "--out", "#" + case["out"]]
             for ranks in RANKS:
-                out = self.folder / case["out"]
                 out.unlink(missing_ok=True)
-                row = self.run([*arguments, "--out", case["out"]], ranks)
+                row = self.run(command, ranks, copies=2 if ranks == 1 else 1)
                 digests.add(hashlib.sha256(out.read_bytes()).hexdigest())
                 row.update(size=size, label=label, written=out.stat().st_size)
+                if ranks == 1 and not rows:
+                    row["alone"] = self.run(command, 1)["cpu"]
                 rows.append(row)
                 print(f"{case['name']:12} {label:18} {ranks} ranks: {row['busiest']:.2f} CPU-s "
                       f"the busiest of {row['cpu']:.2f}, {row['wall']:.2f} s", file=sys.stderr)
@@ -124,21 +136,21 @@ class Bench:
         def wanted(name):
             return not only or any(o in name for o in only)
 
-        def case(name, made, arguments, **more):
-            """`made`: names, points and cores of two sizes."""
+        def case(name, data, arguments, **more):
+            """`data`: names, points and cores of two sizes."""
             return dict({
                 "name": name, "out": "o.rd.exr", "passes": 0,
-                "sizes": [p[0] * p[1] * core * core * 3 for _, p, core in made],
+                "sizes": [p[0] * p[1] * core * core * 3 for _, p, core in data],
                 "runs": [(f"{p[0]} × {p[1]} points, core {core}", [arguments[0], n, *arguments[1:]])
-                         for n, p, core in made]}, **more)
+                         for n, p, core in data]}, **more)
 
         marble = (SOURCE / "rigs/marble-flat.toml").read_text()
-        windows = [("w16.toml", (4, 4), 39), ("w32.toml", (8, 4), 39)]
+        windows = [("w32.toml", (8, 4), 39), ("w128.toml", (16, 8), 39)]
         beams = [("b8.toml", (4, 2), 39), ("b32.toml", (8, 4), 39)]
         for name, points, core in windows + beams:
             (self.folder / name).write_text(grid(marble, points, core))
         # SVDs are shared from 8192 slices on.
-        many = [("many.rd.exr", (128, 64), 21), ("more.rd.exr", (128, 128), 21)]
+        many = [("many.rd.exr", (128, 128), 21), ("more.rd.exr", (256, 192), 21)]
         few = [("few.rd.exr", (40, 40), 9), ("some.rd.exr", (64, 64), 11)]
         cases = [
             case("simulate fast", windows, ["simulate", "--solver", "fast"]),
@@ -170,15 +182,24 @@ class Bench:
         return cases + ([render] if wanted("render") else [])
 
     def reconstruct_case(self):
-        """Sessions of a rig like rigs/simulated-chessboard4x4.toml, its camera as large as needed."""
+        """Sessions of rigs/simulated-chessboard4x4.toml and of its inner quarter, seen by a quarter
+        of the camera's pixels."""
         rig = (SOURCE / "rigs/simulated-chessboard4x4.toml").read_text()
         phantom = (SOURCE / "rigs/chessboard4x4.toml").read_text()
         core = 15
+        half = rig
+        for whole in ("width_px = 560", "height_px = 560", "field_mm = 172.0",
+                      "checkerboard_square_mm = 12.0"):
+            name, value = whole.split(" = ")
+            number = float(value) if "." in value else int(value)
+            if whole not in rig:
+                raise SystemExit(f"no {whole} in the rig")
+            half = half.replace(whole, f"{name} = {type(number)(number / 2)}")
         made = []
-        for points in ((32, 32), (64, 48)):
+        for points, text in (((32, 32), half), ((64, 64), rig)):
             name = f"rig-{points[0]}"
             (self.folder / "chessboard4x4.toml").write_text(grid(phantom, points, core))
-            (self.folder / f"{name}.toml").write_text(grid(rig, points, core))
+            (self.folder / f"{name}.toml").write_text(grid(text, points, core))
             self.tool("capture", f"{name}.toml", "--out", f"session-{name}")
             self.tool("calibrate", f"session-{name}", "--out", f"{name}.json")
             made.append((name, points))
@@ -209,6 +230,9 @@ def main():
             for case in cases:
                 case["rows"] = bench.measure(case)
                 del case["runs"]
+            slower = [case["rows"][0]["cpu"] / case["rows"][0]["alone"] for case in cases]
+            print(f"CPU-seconds beside a copy over alone: {min(slower):.2f} to {max(slower):.2f}",
+                  file=sys.stderr)
         print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores", file=sys.stderr)
     if arguments.keep:
         Path(arguments.keep).write_text(json.dumps(cases, indent=1))
