@@ -135,6 +135,12 @@ Estimate FitClass(const SpotRings& rings, const Eigen::MatrixXd& columns) {
   return {x(0) - x(1), std::sqrt(std::max(0.0, inverse) * residual2)};
 }
 
+// Whether it says anything: pictures without light, for one, don't.
+bool IsUsable(const Estimate& e) {
+  return std::isfinite(e.value) && e.sigma > 0 && std::isfinite(e.sigma) &&
+         std::isfinite(1 / (e.sigma * e.sigma));
+}
+
 double BrightnessAside(const SpotRings& rings) {
   double sum = 0;
   double pixels = 0;
@@ -170,11 +176,11 @@ Estimate FitChannel(const SpotsOfChannel& channel, double eta, double least_dept
     std::vector<Estimate> estimates;
     for (const SpotRings& one : classes) {
       const Estimate estimate = FitClass(one, columns);
-      if (estimate.sigma > 0) {
+      if (IsUsable(estimate)) {
         estimates.push_back(estimate);
       }
     }
-    return Pool(estimates).mean;
+    return estimates.empty() ? Estimate{} : Pool(estimates).mean;
   };
   const std::vector<SpotRings> classes = ClassesOf(channel.spots);
   Estimate best = fit(least_depth, classes);
@@ -226,7 +232,7 @@ std::vector<Estimate> FitGloss(const std::vector<SpotsOfChannel>& channels,
       return {};
     }
     estimates.push_back(FitChannel(channel, eta, least_depth));
-    if (!(estimates.back().sigma > 0)) {
+    if (!IsUsable(estimates.back())) {
       return {};
     }
   }
@@ -245,6 +251,9 @@ std::vector<Estimate> FitGloss(const std::vector<SpotsOfChannel>& channels,
     Estimate said = Pool(others, tau2).mean;
     said.sigma = std::hypot(said.sigma, std::sqrt(tau2));
     shared.push_back(Pool({estimates[c], said}).mean);
+    if (!IsUsable(shared.back())) {
+      return {};
+    }
   }
   return shared;
 }
