@@ -98,7 +98,7 @@ struct AravisCamera::Parts {
   void Reconnect(const std::string& reason) {
     Tell(/*away=*/true);
     Close();
-    const auto deadline =
+    const auto deadline =  // NOLINT(clang-analyzer-deadcode.DeadStores): read below
         Clock::now() + std::chrono::duration<double>(options.reconnect_s);
     auto pause = kFirstPause;
     for (;;) {

@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <fcntl.h>
+#include <filesystem>
 #include <fmt/format.h>
 #include <optional>
 #include <string_view>
@@ -65,6 +66,10 @@ std::optional<JournalEntry> ParseLine(std::string_view line,
   }
   entry.exposure_us = Get<double>(json, "applied_exposure_us", origin);
   entry.file = Get<std::string>(json, "file", origin);
+  const auto file = std::filesystem::path(entry.file).lexically_normal();
+  if (!file.is_relative() || file.empty() || *file.begin() == "..") {
+    throw BadData(origin + ": field 'file': '" + entry.file + "' isn't in the session");
+  }
   entry.hash = Get<std::string>(json, "xxh3", origin);
   entry.frame_id = Get<std::uint64_t>(json, "frame_id", origin);
   entry.timestamp_ns = Get<std::int64_t>(json, "timestamp_ns", origin);

@@ -27,6 +27,9 @@ ArtefactKind KindOfExr(const std::string& head) {
   return says("nacre.format", "") ? ArtefactKind::kMaterial : ArtefactKind::kExrPicture;
 }
 
+// In the head of a page of `nacre report`.
+constexpr const char* kProvenanceMark = "<meta name=\"nacre.provenance\"";
+
 bool HasTable(const std::string& text, const std::string& table) {
   return std::regex_search(text,
                            std::regex("(^|\n)[ \t]*\\[[ \t]*" + table + "[ \t]*\\]"));
@@ -42,6 +45,9 @@ ArtefactKind KindOfText(const std::filesystem::path& path, const std::string& he
   if (extension == ".json" && head.find("\"camera\"") != std::string::npos &&
       head.find("\"scan_map\"") != std::string::npos) {
     return ArtefactKind::kCalibration;
+  }
+  if (extension == ".html" && head.find(kProvenanceMark) != std::string::npos) {
+    return ArtefactKind::kReport;
   }
   return extension == ".obj" ? ArtefactKind::kObjMesh : ArtefactKind::kUnknown;
 }
@@ -68,6 +74,10 @@ const char* Name(ArtefactKind kind) {
       return "phantom";
     case ArtefactKind::kRig:
       return "rig";
+    case ArtefactKind::kReport:
+      return "report";
+    case ArtefactKind::kExport:
+      return "export";
     case ArtefactKind::kPlyMesh:
       return "PLY mesh";
     case ArtefactKind::kObjMesh:
@@ -96,6 +106,7 @@ ArtefactKind DetectKind(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) {
     return std::filesystem::exists(path / "session.json")  ? ArtefactKind::kSession
            : std::filesystem::exists(path / "preset.toml") ? ArtefactKind::kPreset
+           : std::filesystem::exists(path / "export.json") ? ArtefactKind::kExport
                                                            : ArtefactKind::kUnknown;
   }
   const std::string head = Head(path, kHeadBytes);

@@ -16,6 +16,8 @@ enum class ArtefactKind {
   kCalibration,  ///< calibration.json
   kPhantom,      ///< TOML with [slab]
   kRig,          ///< TOML with [scanner]
+  kReport,       ///< a page of `nacre report`
+  kExport,       ///< a folder with export.json
   kPlyMesh,
   kObjMesh,
   kUnknown,

@@ -10,7 +10,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct CalibrateArguments {
   std::filesystem::path session;
   std::filesystem::path out;
   std::filesystem::path check;
@@ -36,7 +36,7 @@ std::string ToText(const std::vector<calibrate::Warning>& warnings) {
 
 // Is that calibration still true of the session, and what does its sample say?
 int CheckCalibration(const acquire::SessionReader& session,
-                     const Arguments& arguments,
+                     const CalibrateArguments& arguments,
                      const Common& common) {
   const calibrate::Calibration calibration =
       calibrate::ReadCalibration(arguments.check);
@@ -115,7 +115,7 @@ std::string ToText(const calibrate::Calibration& calibration) {
 }  // namespace
 
 std::function<int()> MakeCalibrateVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CalibrateArguments>();
   app.add_option("session", arguments->session, "session folder, from nacre capture")
       ->required();
   app.add_option("--out", arguments->out, "calibration to write, *.json");

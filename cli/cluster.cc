@@ -12,13 +12,13 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct ClusterArguments {
   std::filesystem::path file;
   std::filesystem::path out;
   reconstruct::ClusterOptions options{.clusters = 0};
 };
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const ClusterArguments& args, const Common& common) {
   reconstruct::ClusterOptions options = args.options;
   options.seed = common.seed;
   options.thread_count = common.thread_count;
@@ -65,7 +65,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeClusterVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<ClusterArguments>();
   app.add_option("file", args->file, "dataset, *.rd.exr")->required();
   app.add_option(
          "-o,--out", args->out, "map to write, *.exr; its picture lies beside it")

@@ -20,7 +20,7 @@ using reconstruct::RdHeader;
 using reconstruct::RdSlice;
 using reconstruct::SliceSource;
 
-struct Arguments {
+struct CompareArguments {
   std::filesystem::path a;
   std::filesystem::path b;
 };
@@ -134,7 +134,7 @@ SliceSource Open(const std::filesystem::path& path, ArtefactKind kind) {
   }
 }
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const CompareArguments& args, const Common& common) {
   const ArtefactKind a = DetectKind(args.a);
   const ArtefactKind b = DetectKind(args.b);
   const SliceSource source_a = Open(args.a, a);
@@ -157,7 +157,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeCompareVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<CompareArguments>();
   app.add_option("a", args->a, "the reference: dataset, material or picture")
       ->required();
   app.add_option("b", args->b, "what is compared with it")->required();

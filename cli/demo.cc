@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct DemoArguments {
   fs::path out = "out";
   fs::path mesh;
   bool quick = false;
@@ -95,7 +95,7 @@ std::string AgainstTruth(const Json& json) {
       100 * Number(json, "worst_total"));
 }
 
-void RunLine(Line& line, const Arguments& args) {
+void RunLine(Line& line, const DemoArguments& args) {
   const fs::path& out = args.out;
   const std::string variant = args.quick ? "-quick" : "";
   const std::string phantom =
@@ -159,7 +159,7 @@ void RunLine(Line& line, const Arguments& args) {
 
 /// A mesh of the user's choice goes straight to the renderer; the scans that
 /// scripts/fetch-dragon gets need scale and texture coordinates first.
-fs::path PrepareMesh(Line& line, const Arguments& args, const Common& common) {
+fs::path PrepareMesh(Line& line, const DemoArguments& args, const Common& common) {
   if (args.mesh.empty()) {
     throw UsageError(
         "--mesh is needed: a dragon as .ply.gz, .ply, .obj or .off, which "
@@ -173,7 +173,7 @@ fs::path PrepareMesh(Line& line, const Arguments& args, const Common& common) {
   return prepared;
 }
 
-int Run(Arguments args, const Common& common) {
+int Run(DemoArguments args, const Common& common) {
   if (args.quick) {
     args.size = 256;
     args.spp = 16;
@@ -207,7 +207,7 @@ int Run(Arguments args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeDemoVerb(CLI::App& app, const Common& common) {
-  auto args = std::make_shared<Arguments>();
+  auto args = std::make_shared<DemoArguments>();
   app.add_option("--out", args->out, "folder for everything that is made")
       ->capture_default_str();
   app.add_option("--mesh", args->mesh, "the object: .ply, .ply.gz, .obj or .off");

@@ -20,7 +20,7 @@ namespace {
 
 using reconstruct::RdHeader;
 
-struct Arguments {
+struct EditArguments {
   std::filesystem::path file;
   std::filesystem::path out;
   std::vector<double> albedo;
@@ -78,7 +78,7 @@ reconstruct::SliceSource SourceOf(const view::Sample& sample) {
   return {sample.header(), [&sample](int i, int j) { return sample.Slice(i, j, 0); }};
 }
 
-reconstruct::Edit MakeEdit(const Arguments& arguments,
+reconstruct::Edit MakeEdit(const EditArguments& arguments,
                            const RdHeader& header,
                            const reconstruct::SliceSource* other) {
   const std::vector<float> mask = ReadMask(arguments.mask, header);
@@ -111,7 +111,7 @@ reconstruct::Edit MakeEdit(const Arguments& arguments,
   return edit;
 }
 
-std::string ProvenanceOf(const Arguments& arguments) {
+std::string EditProvenance(const EditArguments& arguments) {
   Provenance provenance{.command = "edit",
                         .options = {{"albedo", arguments.albedo},
                                     {"range", arguments.range},
@@ -129,7 +129,7 @@ std::string ProvenanceOf(const Arguments& arguments) {
   return provenance.ToString();
 }
 
-int Run(Arguments& arguments, const Common& common) {
+int Run(EditArguments& arguments, const Common& common) {
 #ifdef NACRE_HAS_PRESETS
   arguments.file = preset::MaterialPath(arguments.file);
   if (!arguments.mix.empty()) {
@@ -148,7 +148,7 @@ int Run(Arguments& arguments, const Common& common) {
   const reconstruct::EditSummary summary = reconstruct::WriteEdited(
       source,
       MakeEdit(arguments, source.header, second ? &other : nullptr),
-      ProvenanceOf(arguments),
+      EditProvenance(arguments),
       arguments.out,
       progress);
   std::string text = fmt::format(
@@ -173,7 +173,7 @@ int Run(Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeEditVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EditArguments>();
   app.add_option("file", arguments->file, "a dataset, a material or a preset")
       ->required();
   app.add_option("-o,--out", arguments->out, "dataset to write, *.rd.exr")->required();

@@ -19,7 +19,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct ExportArguments {
   std::filesystem::path file;
   std::string name;  ///< of the file, or of the preset that it belongs to
   std::string to;
@@ -27,7 +27,7 @@ struct Arguments {
   reconstruct::ExportOptions options;
 };
 
-int ToPsf(const Arguments& args, const Common& common) {
+int ToPsf(const ExportArguments& args, const Common& common) {
   if (DetectKind(args.file) == ArtefactKind::kMaterial) {
     throw UsageError(
         fmt::format("--to psf takes a dataset; 'nacre edit {} --out "
@@ -55,7 +55,7 @@ int ToPsf(const Arguments& args, const Common& common) {
 #ifdef NACRE_HAS_FACTOR
 
 // A material of Gaussian profiles as it is; profiles are fitted to a dataset.
-int ToSss(const Arguments& args, const Common& common) {
+int ToSss(const ExportArguments& args, const Common& common) {
   factor::Material material;
   if (DetectKind(args.file) == ArtefactKind::kMaterial) {
     material = factor::ReadMaterial(args.file);
@@ -100,10 +100,10 @@ exchange::ProfileFit Fit(const std::filesystem::path& file, const Common& common
 }
 
 int ToRenderer(const exchange::Target& target,
-               const Arguments& args,
+               const ExportArguments& args,
                const Common& common) {
   const exchange::ProfileFit fit = Fit(args.file, common);
-  Json json = exchange::ExportMaps(target, fit, args.name, args.out);
+  Json json = exchange::ExportMaps(target, fit, args.file, args.name, args.out);
   json["out"] = args.out.string();
   Say(common, "fit: " + fit.summary.Brief());
   Say(common, std::string("lost: ") + target.lost);
@@ -113,7 +113,7 @@ int ToRenderer(const exchange::Target& target,
 
 #endif
 
-int Run(Arguments& args, const Common& common) {
+int Run(ExportArguments& args, const Common& common) {
   args.name = args.file.lexically_normal().filename().string();
 #ifdef NACRE_HAS_PRESETS
   args.file = preset::MaterialPath(args.file);
@@ -140,7 +140,7 @@ int Run(Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeExportVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<ExportArguments>();
   app.add_option("file",
                  args->file,
                  "dataset, *.rd.exr; to sss and renderers also *.nacre.exr or a preset")

@@ -17,7 +17,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct FactorArguments {
   std::filesystem::path dataset;
   std::filesystem::path out;
   std::filesystem::path reuse;
@@ -73,13 +73,15 @@ factor::FactorOptions Changed(const factor::Material& made,
 }
 
 // What is to be done, and with what to begin.
-struct Plan {
+struct FactorPlan {
   factor::FactorOptions options;
   std::optional<factor::Material> made;
 };
 
-Plan MakePlan(const CLI::App& app, const Arguments& arguments, const Common& common) {
-  Plan plan{arguments.options, {}};
+FactorPlan MakePlan(const CLI::App& app,
+                    const FactorArguments& arguments,
+                    const Common& common) {
+  FactorPlan plan{arguments.options, {}};
   plan.options.seed = common.seed;
   if (!arguments.reuse.empty()) {
     plan.made = factor::ReadMaterial(arguments.reuse);
@@ -98,8 +100,8 @@ Plan MakePlan(const CLI::App& app, const Arguments& arguments, const Common& com
   return plan;
 }
 
-int Run(const CLI::App& app, const Arguments& arguments, const Common& common) {
-  const Plan plan = MakePlan(app, arguments, common);
+int Run(const CLI::App& app, const FactorArguments& arguments, const Common& common) {
+  const FactorPlan plan = MakePlan(app, arguments, common);
   if (plan.options.ranks == nullptr && !common.IsRoot()) {
     return 0;
   }
@@ -126,7 +128,7 @@ int Run(const CLI::App& app, const Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeFactorVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<FactorArguments>();
   app.add_option("dataset", arguments->dataset, "R_d, *.rd.exr")->required();
   app.add_option("--out", arguments->out, "the material, *.nacre.exr")->required();
   app.add_option("--reuse",

@@ -22,7 +22,7 @@ using reconstruct::ImageImportOptions;
 using reconstruct::ImportOptions;
 using reconstruct::ImportSummary;
 
-struct Arguments {
+struct ImportArguments {
   std::filesystem::path file;
   std::string from;
   std::filesystem::path out;
@@ -34,7 +34,7 @@ struct Arguments {
 #ifdef NACRE_HAS_FACTOR
 
 // Profiles are a material already; as a dataset they are sampled.
-ImportSummary ImportSss(const Arguments& args, const ProgressFunction& progress) {
+ImportSummary ImportSss(const ImportArguments& args, const ProgressFunction& progress) {
   const factor::Material m = factor::ReadSss(args.file,
                                              {.pitch_mm = args.options.pitch_mm,
                                               .eta = args.options.eta,
@@ -53,7 +53,7 @@ ImportSummary ImportSss(const Arguments& args, const ProgressFunction& progress)
 
 #endif
 
-ImportSummary RunImport(const Arguments& args, const Common& common) {
+ImportSummary RunImport(const ImportArguments& args, const Common& common) {
   const ProgressFunction progress = ConsoleProgress(common);
   if (args.from == "psf") {
     return reconstruct::ImportPsf(args.file, args.out, args.options, progress);
@@ -86,7 +86,7 @@ ImportSummary RunImport(const Arguments& args, const Common& common) {
                    ": not one of psf, sss, images, npy and mat");
 }
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const ImportArguments& args, const Common& common) {
   if (!(args.options.pitch_mm > 0)) {
     throw UsageError("--pitch-mm must be more than 0");
   }
@@ -106,7 +106,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeImportVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<ImportArguments>();
   app.add_option("file", args->file, "the file; of images, the folder")->required();
   app.add_option("--from", args->from, "psf, sss, images, npy or mat")->required();
   app.add_option(

@@ -29,7 +29,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct InspectArguments {
   std::filesystem::path file;
   bool provenance = false;
 };
@@ -296,6 +296,10 @@ Json Inspect(const std::filesystem::path& path,
       return InspectPhantom(path);
     case ArtefactKind::kRig:
       return InspectRig(path);
+    case ArtefactKind::kReport:
+      return InspectReport(path);
+    case ArtefactKind::kExport:
+      return InspectExport(path);
     case ArtefactKind::kPlyMesh:
       return InspectPly(path);
     case ArtefactKind::kObjMesh:
@@ -306,7 +310,7 @@ Json Inspect(const std::filesystem::path& path,
   throw BadData(
       path.string() +
       ": is none of: dataset, material, preset, session, calibration, phantom, rig, "
-      "picture (.exr, .png), mesh (.ply, .obj)");
+      "picture (.exr, .png), mesh (.ply, .obj), report (.html), export (a folder)");
 }
 
 // One line a key; lists of objects one line an element.
@@ -332,7 +336,7 @@ std::string ToText(const Json& json) {
 
 // For people the commands that remake the file; as JSON all that is recorded too.
 void PrintProvenance(const Json& provenance,
-                     const Arguments& args,
+                     const InspectArguments& args,
                      const Common& common) {
   if (!provenance.is_object()) {
     throw Error(args.file.string() + ": carries no provenance");
@@ -348,7 +352,7 @@ void PrintProvenance(const Json& provenance,
                     fmt::join(commands, "\n")));
 }
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const InspectArguments& args, const Common& common) {
   const ArtefactKind kind = DetectKind(args.file);
   Json json{{"file", args.file.string()}, {"kind", Name(kind)}};
   if (std::filesystem::is_regular_file(args.file)) {
@@ -367,7 +371,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeInspectVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<InspectArguments>();
   app.add_option("file", args->file, "anything nacre reads or writes")->required();
   app.add_flag(
       "--provenance",

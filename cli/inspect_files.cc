@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <fstream>
+#include <regex>
 #include <sstream>
 
 namespace nacre::cli {
@@ -67,6 +68,29 @@ Json InspectExr(const std::filesystem::path& path) {
     }
   }
   return {{"parts", parts}, {"provenance", provenance}};
+}
+
+Json InspectReport(const std::filesystem::path& path) {
+  const std::string page = Head(path, 1 << 20);
+  const std::string mark = "<meta name=\"nacre.provenance\" content=\"";
+  const std::size_t at = page.find(mark);
+  const std::size_t end = at == std::string::npos ? at : page.find("\">", at);
+  if (end == std::string::npos) {
+    throw BadData(path.string() + ": the page's head says nothing of its provenance");
+  }
+  std::string text = page.substr(at + mark.size(), end - at - mark.size());
+  const std::pair<const char*, const char*> escaped[] = {
+      {"&quot;", "\""}, {"&lt;", "<"}, {"&gt;", ">"}, {"&amp;", "&"}};
+  for (const auto& [from, to] : escaped) {
+    text = std::regex_replace(text, std::regex(from), to);
+  }
+  const Json provenance = ParseJson(text, path.string());
+  return {{"of", provenance.value("inputs", Json::array())},
+          {"provenance", provenance}};
+}
+
+Json InspectExport(const std::filesystem::path& path) {
+  return ReadJson(path / "export.json");
 }
 
 Json InspectPng(const std::filesystem::path& path) {

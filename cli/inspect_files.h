@@ -28,6 +28,10 @@ Json ProvenanceOf(const std::string& text);
 
 Json InspectExr(const std::filesystem::path& path);
 Json InspectPng(const std::filesystem::path& path);
+/// What a page of `nacre report` is of, and the page's own provenance.
+Json InspectReport(const std::filesystem::path& path);
+/// What `nacre export` wrote into a folder.
+Json InspectExport(const std::filesystem::path& path);
 /// Counts alone, from the header: a mesh is read by the renderer, not here.
 Json InspectPly(const std::filesystem::path& path);
 Json InspectObj(const std::filesystem::path& path);

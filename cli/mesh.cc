@@ -12,13 +12,13 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct MeshArguments {
   std::filesystem::path in;
   std::filesystem::path out;
   render::MeshPrepareOptions options;
 };
 
-int Run(const Arguments& arguments, const Common& common) {
+int Run(const MeshArguments& arguments, const Common& common) {
   render::TriangleMesh mesh = render::ReadMeshFile(arguments.in);
   const render::MeshPrepareSummary summary =
       render::PrepareMesh(mesh, arguments.options);
@@ -35,7 +35,7 @@ int Run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeMeshVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MeshArguments>();
   app.add_option("in", arguments->in, "a mesh: .ply, .obj or .off, or one as .gz")
       ->required();
   app.add_option("out", arguments->out, "binary PLY")->required();

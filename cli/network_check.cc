@@ -19,7 +19,7 @@
 namespace nacre::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+using SteadyClock = std::chrono::steady_clock;
 using State = Finding::State;
 
 constexpr std::size_t kPayloadBytes = 8972;  // of 9000, without IP and UDP headers
@@ -84,8 +84,8 @@ std::optional<Loss> Measure() {
   length = sizeof loss.buffer_bytes;
   ::getsockopt(receiver.fd(), SOL_SOCKET, SO_RCVBUF, &loss.buffer_bytes, &length);
   loss.buffer_bytes /= 2;  // the kernel doubles what it is asked for, and tells so
-  const auto start = Clock::now();
-  for (; loss.frames < kFrames && Clock::now() - start < kTime; ++loss.frames) {
+  const auto start = SteadyClock::now();
+  for (; loss.frames < kFrames && SteadyClock::now() - start < kTime; ++loss.frames) {
     std::thread burst([&sender] {
       const std::array<char, kPayloadBytes> packet{};
       for (int k = 0; k < kPackets; ++k) {
@@ -98,7 +98,7 @@ std::optional<Loss> Measure() {
     while (::recv(receiver.fd(), late.data(), late.size(), MSG_DONTWAIT) >= 0) {
     }
   }
-  loss.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  loss.seconds = std::chrono::duration<double>(SteadyClock::now() - start).count();
   return loss;
 }
 
@@ -141,14 +141,15 @@ std::vector<Finding> CheckDiskSpeed(const std::filesystem::path& folder) {
   }
   ::unlink(path.c_str());
   const std::string block(std::size_t{1} << 20, 'n');
-  const auto start = Clock::now();
+  const auto start = SteadyClock::now();
   std::size_t written = 0;
-  for (int k = 0; k < 64 && Clock::now() - start < kTime; ++k) {
+  for (int k = 0; k < 64 && SteadyClock::now() - start < kTime; ++k) {
     const ssize_t count = ::write(fd, block.data(), block.size());
     written += count > 0 ? static_cast<std::size_t>(count) : 0;
   }
   ::fdatasync(fd);
-  const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  const double seconds =
+      std::chrono::duration<double>(SteadyClock::now() - start).count();
   ::close(fd);
   const double speed = static_cast<double>(written) * 1e-6 / seconds;
   constexpr double kCameraMbPerS = 100;  // a gigabit of Ethernet

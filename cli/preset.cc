@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct PresetArguments {
   std::vector<std::string> folders;  // searched before all others
   std::string name;                  // or a folder
   preset::MakeInputs inputs;
@@ -26,7 +26,7 @@ struct Arguments {
 
 // The scene folder of PresetFolders is where the options' folders come in; the working
 // folder is searched too, as by scenes.
-std::vector<fs::path> Folders(const Arguments& args) {
+std::vector<fs::path> Folders(const PresetArguments& args) {
   std::vector<fs::path> folders(args.folders.begin(), args.folders.end());
   for (fs::path& folder : render::PresetFolders(".")) {
     folders.push_back(std::move(folder));
@@ -34,7 +34,7 @@ std::vector<fs::path> Folders(const Arguments& args) {
   return folders;
 }
 
-std::vector<preset::Preset> All(const Arguments& args, const Common& common) {
+std::vector<preset::Preset> All(const PresetArguments& args, const Common& common) {
   std::vector<std::string> problems;
   std::vector<preset::Preset> presets = preset::FindPresets(Folders(args), problems);
   for (const std::string& problem : problems) {
@@ -43,7 +43,7 @@ std::vector<preset::Preset> All(const Arguments& args, const Common& common) {
   return presets;
 }
 
-preset::Preset Find(const Arguments& args, const Common& common) {
+preset::Preset Find(const PresetArguments& args, const Common& common) {
   if (fs::is_regular_file(fs::path(args.name) / "preset.toml")) {
     return preset::ReadPreset(args.name);
   }
@@ -62,7 +62,7 @@ preset::Preset Find(const Arguments& args, const Common& common) {
                 (known.empty() ? "none" : known) + "; looked in" + looked);
 }
 
-int List(const Arguments& args, const Common& common) {
+int List(const PresetArguments& args, const Common& common) {
   Json presets = Json::array();
   std::string text;
   for (const preset::Preset& preset : All(args, common)) {
@@ -79,7 +79,7 @@ int List(const Arguments& args, const Common& common) {
   return 0;
 }
 
-int Show(const Arguments& args, const Common& common) {
+int Show(const PresetArguments& args, const Common& common) {
   const preset::Preset preset = Find(args, common);
   const Json json = preset::ToJson(preset);
   std::string text;
@@ -93,7 +93,7 @@ int Show(const Arguments& args, const Common& common) {
   return 0;
 }
 
-int Check(const Arguments& args, const Common& common) {
+int Check(const PresetArguments& args, const Common& common) {
   std::vector<preset::Preset> presets;
   if (args.name.empty()) {
     presets = All(args, common);
@@ -119,7 +119,7 @@ int Check(const Arguments& args, const Common& common) {
   return static_cast<int>(broken == 0 ? ExitCode::kDone : ExitCode::kBadData);
 }
 
-int Make(Arguments& args, const Common& common) {
+int Make(PresetArguments& args, const Common& common) {
   args.inputs.scene = FindResource("scenes/thumbnail.xml");
   args.make.thread_count = common.thread_count;
   const preset::Preset preset =
@@ -135,7 +135,7 @@ int Make(Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakePresetVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<PresetArguments>();
   const auto action = std::make_shared<std::function<int()>>();
   app.require_subcommand(1);
   app.fallthrough();

@@ -9,7 +9,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct ReconstructArguments {
   std::filesystem::path session;
   std::filesystem::path calibration;
   std::filesystem::path out;
@@ -17,7 +17,7 @@ struct Arguments {
   reconstruct::ReconstructOptions options;
 };
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const ReconstructArguments& args, const Common& common) {
   reconstruct::ReconstructOptions options = args.options;
   options.memory_bytes = static_cast<double>(args.memory_bytes);
   options.thread_count = common.thread_count;
@@ -64,7 +64,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeReconstructVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<ReconstructArguments>();
   app.add_option("session", args->session, "folder of a complete session")->required();
   app.add_option("--calibration", args->calibration, "calibration.json of that session")
       ->required();

@@ -145,6 +145,8 @@ class Remaker {
       } else if (input.contains("calibration")) {
         names.emplace_back(kCalibration);
         Add(input.at("calibration"), names.back());
+      } else if (input.contains("folder")) {
+        names.push_back(input.value("folder", ""));
       } else if (input.contains("rig_xxh3")) {
         names.emplace_back("session");  // which reconstruction names by its two files
       } else if (input.value("file", "") == "session.json") {

@@ -18,7 +18,7 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct RenderArguments {
   std::filesystem::path scene;
   std::filesystem::path out;
   std::filesystem::path png;
@@ -36,7 +36,7 @@ struct Arguments {
   render::RenderOptions options;
 };
 
-void AddArguments(CLI::App& app, Arguments& arguments) {
+void AddArguments(CLI::App& app, RenderArguments& arguments) {
   app.add_option("scene", arguments.scene, "scene in Mitsuba's XML (0.4 to 0.6)")
       ->required();
   app.add_option("--out", arguments.out, "picture: .exr (linear) or .png (sRGB)")
@@ -92,7 +92,8 @@ std::map<std::string, std::string> ParseDefines(const std::vector<std::string>& 
   return defines;
 }
 
-std::string ProvenanceOf(const render::Scene& scene, const Arguments& arguments) {
+std::string RenderProvenance(const render::Scene& scene,
+                             const RenderArguments& arguments) {
   Provenance provenance;
   provenance.command = "render";
   provenance.options = OptionsToJson(arguments.options);
@@ -129,7 +130,7 @@ bool IsPng(const std::filesystem::path& path) {
 
 void WriteImage(const std::filesystem::path& path,
                 std::vector<ExrPart> parts,
-                const Arguments& arguments,
+                const RenderArguments& arguments,
                 const std::string& provenance) {
   ExrPart& image = parts.front();
   if (IsPng(path)) {
@@ -160,7 +161,7 @@ void DenoiseFirst(std::vector<ExrPart>& parts,
   }
 }
 
-int Run(Arguments& arguments, const Common& common) {
+int Run(RenderArguments& arguments, const Common& common) {
   if (!IsPng(arguments.out) && arguments.out.extension() != ".exr") {
     throw UsageError("--out " + arguments.out.string() +
                      ": the name must end in .exr or .png");
@@ -187,7 +188,7 @@ int Run(Arguments& arguments, const Common& common) {
   for (const std::string& note : scene.notes) {
     Say(common, note);
   }
-  const std::string provenance = ProvenanceOf(scene, arguments);
+  const std::string provenance = RenderProvenance(scene, arguments);
   const auto save = [&](const std::vector<ExrPart>& parts) {
     WriteImage(arguments.out, parts, arguments, provenance);
     if (!arguments.png.empty()) {
@@ -247,7 +248,7 @@ int Run(Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeRenderVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RenderArguments>();
   AddArguments(app, *arguments);
   return [arguments, &common] { return Run(*arguments, common); };
 }

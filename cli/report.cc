@@ -12,12 +12,12 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct ReportArguments {
   std::filesystem::path path;
   std::filesystem::path out = "report.html";
 };
 
-int Run(const Arguments& arguments, const Common& common) {
+int Run(const ReportArguments& arguments, const Common& common) {
   const std::string page = report::BuildReport(arguments.path, ConsoleProgress(common));
   WriteFile(arguments.out, page);
   Print(common,
@@ -31,7 +31,7 @@ int Run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeReportVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReportArguments>();
   app.add_option("path", arguments->path, "an artefact, or a folder of artefacts")
       ->required();
   app.add_option("--out", arguments->out, "the page")->capture_default_str();

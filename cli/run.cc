@@ -18,7 +18,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
+struct RunArguments {
   fs::path project;
   bool dry_run = false;
   bool force = false;
@@ -130,7 +130,7 @@ Json RunStage(const ProjectStage& stage,
           {"result", Json::accept(text) ? Json::parse(text) : Json(text)}};
 }
 
-int Run(const Arguments& args, const Common& common) {
+int Run(const RunArguments& args, const Common& common) {
   const std::vector<ProjectStage> stages = ReadProject(args.project);
   const fs::path project = fs::absolute(args.project);
   const WorkingFolder folder(project.parent_path());
@@ -184,7 +184,7 @@ int Run(const Arguments& args, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeRunVerb(CLI::App& app, const Common& common) {
-  const auto args = std::make_shared<Arguments>();
+  const auto args = std::make_shared<RunArguments>();
   app.add_option("project", args->project, "TOML with the [[stage]]s of a line")
       ->required();
   app.add_flag("--dry-run", args->dry_run, "say what would run and why");

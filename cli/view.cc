@@ -13,14 +13,14 @@
 namespace nacre::cli {
 namespace {
 
-struct Arguments {
+struct ViewArguments {
   std::filesystem::path path;
   std::filesystem::path against;
   int port = 0;
   double time_limit = 0;
 };
 
-int Run(const Arguments& arguments, const Common& common) {
+int Run(const ViewArguments& arguments, const Common& common) {
   const web::LocalServer server(
       arguments.port,
       view::OpenView(arguments.path, arguments.against, ConsoleProgress(common)),
@@ -40,7 +40,7 @@ int Run(const Arguments& arguments, const Common& common) {
 }  // namespace
 
 std::function<int()> MakeViewVerb(CLI::App& app, const Common& common) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ViewArguments>();
   app.add_option(
          "path",
          arguments->path,

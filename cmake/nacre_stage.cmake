@@ -9,6 +9,8 @@ target_compile_options(nacre_flags INTERFACE
   -Wnon-virtual-dtor -Woverloaded-virtual -Wimplicit-fallthrough
   $<$<CXX_COMPILER_ID:GNU>:-Wduplicated-cond -Wlogical-op -Wuseless-cast>
   $<$<BOOL:${NACRE_WERROR}>:-Werror>
+  # Of files compiled together, g++ takes all but one for headers.
+  $<$<AND:$<CXX_COMPILER_ID:GNU>,$<BOOL:${CMAKE_UNITY_BUILD}>>:-Wno-subobject-linkage>
   -fno-math-errno -ffp-contract=off)
 if(NOT NACRE_SANITIZE)
   target_compile_options(nacre_flags INTERFACE
@@ -30,7 +32,6 @@ function(nacre_stage name)
   set_target_properties(${target} PROPERTIES
     EXPORT_NAME ${name}
     POSITION_INDEPENDENT_CODE ON
-    UNITY_BUILD ${NACRE_UNITY} UNITY_BUILD_BATCH_SIZE 10
     VERIFY_INTERFACE_HEADER_SETS ON)
   target_sources(${target} PUBLIC FILE_SET HEADERS
     BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${stage_HEADERS})

@@ -9,7 +9,7 @@
 namespace nacre::render {
 namespace {
 
-constexpr std::uint32_t kSamples = 16;
+constexpr std::uint32_t kFeatureSamples = 16;
 
 ExrPart Part(const char* name, const Film& film, std::vector<std::string> channels) {
   ExrPart part;
@@ -57,7 +57,7 @@ FeatureImages FirstHitFeatures(const Scene& scene,
           static_cast<std::size_t>(x);
       Color albedo;
       Vec3 normal;
-      for (std::uint32_t n = 0; n < kSamples; ++n) {
+      for (std::uint32_t n = 0; n < kFeatureSamples; ++n) {
         Sampler sampler(MixSeed(seed, pixel), n);
         const Vec2 u = sampler.Next2D();
         const Vec2 position{
@@ -70,7 +70,7 @@ FeatureImages FirstHitFeatures(const Scene& scene,
           normal += hit.normal;
         }
       }
-      constexpr float kShare = 1.0F / static_cast<float>(kSamples);
+      constexpr float kShare = 1.0F / static_cast<float>(kFeatureSamples);
       for (std::size_t c = 0; c < 3; ++c) {
         const auto axis = static_cast<int>(c);
         images.albedo.Channel(c)[pixel] = Clamped(albedo[axis] * kShare);

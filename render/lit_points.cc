@@ -18,7 +18,7 @@ namespace {
 constexpr std::int64_t kBlock = 256;
 
 // Density falls by 4 from level to level.
-constexpr int kLevels = 5;
+constexpr int kLitLevels = 5;
 // Level 1 starts at twice that many patches from what is seen, level 2 at 4 times, …
 constexpr float kDensePatches = 3;
 // A triangle with more points than this has levels of its own for each of them.
@@ -65,7 +65,7 @@ class Placement {
   // over, so that each stretch of the surface is off by less than one point.
   void SpreadOverMesh(const TriangleMesh& mesh, double count) {
     const double per_area = count / SurfaceArea(mesh);
-    std::array<double, kLevels> due;
+    std::array<double, kLitLevels> due;
     due.fill(0.5);
     double full_due = 0.5;
     for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
@@ -99,8 +99,8 @@ class Placement {
   // it. What is left of a level shares the area of all its points, and something is.
   void SpreadInPlace(std::uint32_t triangle, std::int64_t count) {
     full_count_ += count;
-    std::array<std::int64_t, kLevels> all{};
-    std::array<std::int64_t, kLevels> kept{};
+    std::array<std::int64_t, kLitLevels> all{};
+    std::array<std::int64_t, kLitLevels> kept{};
     const std::size_t first = places_.size();
     for (std::int64_t k = 0; k < count; ++k) {
       const auto index = static_cast<std::uint32_t>(k);
@@ -127,7 +127,7 @@ class Placement {
     float limit = 2 * dense_;
     const float distance = seen_->DistanceTo(position);
     int level = 0;
-    while (level + 1 < kLevels && distance >= limit) {
+    while (level + 1 < kLitLevels && distance >= limit) {
       ++level;
       limit *= 2;
     }

@@ -52,7 +52,7 @@ std::filesystem::path FindPreset(const std::string& name,
   for (const std::filesystem::path& folder : PresetFolders(scene_folder)) {
     for (const std::string& file :
          {name, name + ".nacre.exr", name + "/material.nacre.exr"}) {
-      const std::filesystem::path path = folder / file;
+      std::filesystem::path path = folder / file;
       std::error_code none;
       if (std::filesystem::is_regular_file(path, none)) {
         return path;

@@ -17,8 +17,8 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "the format's byte order");
 
-constexpr std::uint16_t kMagic = 0x041C;
-constexpr std::size_t kHeaderBytes = 4;  // magic and version
+constexpr std::uint16_t kMeshMagic = 0x041C;
+constexpr std::size_t kMeshHeaderBytes = 4;  // magic and version
 
 enum Flags : std::uint32_t {
   kNormals = 0x0001,
@@ -120,7 +120,8 @@ std::string_view FindMesh(std::string_view bytes,
   const auto fail = [&](const std::string& message) {
     throw BadData(fmt::format("{}: {}", origin, message));
   };
-  if (bytes.size() < kHeaderBytes + 4 || At<std::uint16_t>(bytes, 0) != kMagic) {
+  if (bytes.size() < kMeshHeaderBytes + 4 ||
+      At<std::uint16_t>(bytes, 0) != kMeshMagic) {
     fail("not a .serialized mesh");
   }
   const auto version = At<std::uint16_t>(bytes, 2);
@@ -129,7 +130,7 @@ std::string_view FindMesh(std::string_view bytes,
   }
   const std::uint64_t count = At<std::uint32_t>(bytes, bytes.size() - 4);
   const std::uint64_t entry = version == 4 ? 8 : 4;
-  if (count == 0 || count * entry > bytes.size() - 4 - kHeaderBytes) {
+  if (count == 0 || count * entry > bytes.size() - 4 - kMeshHeaderBytes) {
     fail(fmt::format("cut short: its dictionary names {} meshes", count));
   }
   if (shape_index < 0 || static_cast<std::uint64_t>(shape_index) >= count) {
@@ -143,12 +144,13 @@ std::string_view FindMesh(std::string_view bytes,
   const auto index = static_cast<std::uint64_t>(shape_index);
   const std::uint64_t begin = offset(index);
   const std::uint64_t end = index + 1 < count ? offset(index + 1) : dictionary;
-  if (begin > dictionary || end > dictionary || end < begin + kHeaderBytes) {
+  if (begin > dictionary || end > dictionary || end < begin + kMeshHeaderBytes) {
     fail(fmt::format(
         "mesh {} lies from byte {} to {} of {}", index, begin, end, bytes.size()));
   }
   const auto mesh = bytes.substr(begin, end - begin);
-  if (At<std::uint16_t>(mesh, 0) != kMagic || At<std::uint16_t>(mesh, 2) != version) {
+  if (At<std::uint16_t>(mesh, 0) != kMeshMagic ||
+      At<std::uint16_t>(mesh, 2) != version) {
     fail(fmt::format("no mesh at byte {}, where the dictionary has one", begin));
   }
   return mesh;
@@ -194,7 +196,7 @@ SerializedMesh ParseSerialized(std::string_view bytes,
                                const std::string& origin,
                                int shape_index) {
   const std::string_view found = FindMesh(bytes, origin, shape_index);
-  Stream stream(found.substr(kHeaderBytes), origin);
+  Stream stream(found.substr(kMeshHeaderBytes), origin);
   const auto flags = stream.Next<std::uint32_t>();
   if (At<std::uint16_t>(found, 2) == 4) {
     stream.SkipString();  // its name

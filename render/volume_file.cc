@@ -13,7 +13,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little);
 
-constexpr std::size_t kHeaderBytes = 48;
+constexpr std::size_t kVolumeHeaderBytes = 48;
 constexpr std::uint64_t kMaxBytes = std::uint64_t{4} << 30;
 
 template <class T>
@@ -30,7 +30,8 @@ VolumeGrid ReadVolumeFile(const std::filesystem::path& path) {
   const auto fail = [&](const std::string& what) {
     return BadData(fmt::format("{}: {}", path.string(), what));
   };
-  if (bytes.size() < kHeaderBytes || bytes.compare(0, 3, "VOL") != 0 || bytes[3] != 3) {
+  if (bytes.size() < kVolumeHeaderBytes || bytes.compare(0, 3, "VOL") != 0 ||
+      bytes[3] != 3) {
     throw fail("not a volume (\"VOL\", version 3)");
   }
   if (const auto encoding = At<std::int32_t>(bytes, 4); encoding != 1) {
@@ -50,10 +51,10 @@ VolumeGrid ReadVolumeFile(const std::filesystem::path& path) {
     throw fail(fmt::format("{} channels; 1 or 3 are read", grid.channels));
   }
   count *= grid.channels;
-  if (count * sizeof(float) != static_cast<double>(bytes.size() - kHeaderBytes)) {
+  if (count * sizeof(float) != static_cast<double>(bytes.size() - kVolumeHeaderBytes)) {
     throw fail(fmt::format("{} values announced, {} bytes follow the header",
                            count,
-                           bytes.size() - kHeaderBytes));
+                           bytes.size() - kVolumeHeaderBytes));
   }
   grid.low = At<Vec3>(bytes, 24);
   grid.high = At<Vec3>(bytes, 36);
@@ -64,8 +65,9 @@ VolumeGrid ReadVolumeFile(const std::filesystem::path& path) {
     }
   }
   grid.values.resize(static_cast<std::size_t>(count));
-  std::memcpy(
-      grid.values.data(), bytes.data() + kHeaderBytes, bytes.size() - kHeaderBytes);
+  std::memcpy(grid.values.data(),
+              bytes.data() + kVolumeHeaderBytes,
+              bytes.size() - kVolumeHeaderBytes);
   for (const float v : grid.values) {
     if (!(v >= 0) || std::isinf(v)) {
       throw fail(fmt::format("a value of {}; they must be finite and not negative", v));

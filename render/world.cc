@@ -9,7 +9,7 @@
 namespace nacre::render {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
+constexpr float kUnbounded = std::numeric_limits<float>::infinity();
 constexpr float kUniformSpherePdf = 0.25F * kInvPi;
 
 LightSample FromPoint(Vec3 light, Color intensity, Vec3 position) {
@@ -206,7 +206,7 @@ LightSample World::SampleLight(std::size_t light,
     return sample;
   }
   if (const auto* directional = std::get_if<DirectionalLight>(&any)) {
-    return {-directional->direction, kInfinity, directional->irradiance, 1, true};
+    return {-directional->direction, kUnbounded, directional->irradiance, 1, true};
   }
   if (const auto* projector = std::get_if<ProjectorLight>(&any)) {
     return FromProjector(*projector, position);
@@ -214,7 +214,7 @@ LightSample World::SampleLight(std::size_t light,
   if (const auto* far = std::get_if<EnvironmentLight>(&any)) {
     const Environment::Sample sample = far->environment->SampleDirection(u);
     return {sample.direction,
-            kInfinity,
+            kUnbounded,
             far->environment->Radiance(sample.direction) / sample.pdf,
             sample.pdf,
             false};
@@ -222,12 +222,12 @@ LightSample World::SampleLight(std::size_t light,
   const Color radiance = std::get<ConstantLight>(any).radiance;
   if (side == Vec3{}) {
     return {
-        SquareToSphere(u), kInfinity, radiance / kUniformSpherePdf, kUniformSpherePdf};
+        SquareToSphere(u), kUnbounded, radiance / kUniformSpherePdf, kUniformSpherePdf};
   }
   // A constant light is best sampled by the cosine at the surface.
   const Vec3 local = SquareToCosineHemisphere(u);
   const float pdf = CosineHemispherePdf(local.z);
-  return {Frame(side).ToWorld(local), kInfinity, radiance / pdf, pdf, false};
+  return {Frame(side).ToWorld(local), kUnbounded, radiance / pdf, pdf, false};
 }
 
 LightSample World::SampleEmitter(const Source& source, Vec3 position, Vec2 u) const {

@@ -16,8 +16,8 @@ constexpr int kLarge = LaserTiles::kBandRows;
 constexpr int kSmall = kLarge / 2;
 
 // A tile's points: 3 × 3 nodes, row by row, then the four that test.
-constexpr std::size_t kNodes = 9;
-constexpr std::size_t kPoints = kNodes + 4;
+constexpr std::size_t kTileNodes = 9;
+constexpr std::size_t kPoints = kTileNodes + 4;
 constexpr float kTolerance = 3e-3F;  // of log₂ R_d: 0.2 %
 
 // The peak of R_d may be narrower than a pixel: within some pixels of a spot the mean
@@ -216,7 +216,7 @@ void LaserTiles::AddSmooth(const TileSpot& spot,
     for (std::size_t n = 0; n < 4; ++n) {
       const float s = static_cast<float>(test[n % 2]) * per_pixel;
       const float t = static_cast<float>(test[n / 2]) * per_pixel;
-      smooth = smooth && std::abs(log2.At(s, t) - value[kNodes + n]) <= kTolerance;
+      smooth = smooth && std::abs(log2.At(s, t) - value[kTileNodes + n]) <= kTolerance;
     }
     if (smooth) {
       const auto add = tile.size == kLarge ? AddLargeTile : AddSmallTile;

@@ -12,7 +12,7 @@ namespace {
 
 using Point = std::array<double, 3>;
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kStoneDegree = std::numbers::pi / 180;
 
 double SmoothStep(double low, double high, double x) {
   const double t = std::clamp((x - low) / (high - low), 0.0, 1.0);
@@ -65,8 +65,8 @@ double Profile(double distance, double width) {
 
 VoxelFunction MarbleMixture(const VeinOptions& options) {
   const auto seed = static_cast<std::uint64_t>(options.seed) * 16;
-  const double c = std::cos(options.direction_deg * kDegree);
-  const double s = std::sin(options.direction_deg * kDegree);
+  const double c = std::cos(options.direction_deg * kStoneDegree);
+  const double s = std::sin(options.direction_deg * kStoneDegree);
   return [o = options,
           c,
           s,
@@ -103,9 +103,9 @@ VoxelFunction MarbleMixture(const VeinOptions& options) {
 
 VoxelFunction OnyxMixture(const OnyxOptions& options) {
   const auto seed = static_cast<std::uint64_t>(options.seed) * 16 + 11;
-  const double dip = options.dip_deg * kDegree;
-  const Point ahead{std::cos(options.direction_deg * kDegree) * std::cos(dip),
-                    std::sin(options.direction_deg * kDegree) * std::cos(dip),
+  const double dip = options.dip_deg * kStoneDegree;
+  const Point ahead{std::cos(options.direction_deg * kStoneDegree) * std::cos(dip),
+                    std::sin(options.direction_deg * kStoneDegree) * std::cos(dip),
                     std::sin(dip)};
   return [o = options,
           ahead,

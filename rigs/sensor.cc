@@ -17,16 +17,16 @@ namespace {
 
 // Two words a pixel, so a Philox block serves two pixels. Pixels are done in pieces
 // that fit the first cache.
-constexpr std::size_t kPiece = 1024;
-constexpr std::size_t kBlocks = kPiece / 2;
+constexpr std::size_t kSensorPiece = 1024;
+constexpr std::size_t kBlocks = kSensorPiece / 2;
 constexpr std::size_t kGroup = 64;
 
 // Above it a Poisson variable is a Gaussian one with its skewness put right, rounded.
 constexpr float kGaussianAbove = 20.0F;
 
 struct Draws {
-  std::uint32_t photon[kPiece];  // words that decide the number of electrons
-  std::uint32_t read[kPiece];    // words that decide the read noise
+  std::uint32_t photon[kSensorPiece];  // words that decide the number of electrons
+  std::uint32_t read[kSensorPiece];    // words that decide the read noise
 };
 
 // The blocks of pixels 2 b and 2 b + 1, b from `first_block` on. Philox() of
@@ -227,8 +227,8 @@ void ExposePiece(const SensorModel& sensor,
                  std::span<std::uint16_t> counts) {
   Draws draws;
   Draw(exposure, begin / 2, draws);
-  float mean[kPiece];
-  float electrons[kPiece] = {};
+  float mean[kSensorPiece];
+  float electrons[kSensorPiece] = {};
   const auto exposure_us = static_cast<float>(exposure.exposure_us);
   const auto dark =
       static_cast<float>(sensor.dark_electrons_per_us * exposure.exposure_us);
@@ -249,7 +249,7 @@ void ExposePiece(const SensorModel& sensor,
       DrawFewElectrons(mean + at, draws.photon + at, most, size, electrons + at);
     }
   }
-  float row_electrons[kPiece];
+  float row_electrons[kSensorPiece];
   DrawRows(sensor, exposure, begin, count, row_electrons);
   Convert(sensor, electrons, row_electrons, draws.read, count, counts.data());
 }
@@ -265,7 +265,7 @@ void Expose(const SensorModel& sensor,
   Expect(counts.size() < (std::size_t{1} << 32), "fewer than 2^32 pixels");
   const auto size = static_cast<std::int64_t>(counts.size());
   constexpr std::int64_t kPiecesPerTask = 16;
-  constexpr auto kStep = static_cast<std::int64_t>(kPiece);
+  constexpr auto kStep = static_cast<std::int64_t>(kSensorPiece);
   ParallelForBlocks(
       size, kStep * kPiecesPerTask, thread_count, [&](auto begin, auto end) {
         for (std::int64_t at = begin; at < end; at += kStep) {

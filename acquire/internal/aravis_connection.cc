@@ -13,7 +13,7 @@ using std::chrono::milliseconds;
 
 // A camera frees itself of a program that died when it misses its heartbeat for 3 s.
 constexpr milliseconds kHeartbeatPassed{4000};
-constexpr milliseconds kPause{250};
+constexpr milliseconds kReconnectPause{250};
 constexpr milliseconds kSlice{100};
 constexpr int kBuffers = 4;
 constexpr guint64 kControlChannelPrivilege = 0x0A00;  // a register of GigE Vision
@@ -96,7 +96,7 @@ void AravisConnection::TakeControl() {
                       "one first",
                       options_.id));
     }
-    std::this_thread::sleep_for(kPause);
+    std::this_thread::sleep_for(kReconnectPause);
   }
 }
 

@@ -52,7 +52,7 @@ struct ProjectorWindow::Handles {
   };
 
   struct DestroyWindow {
-    void operator()(SDL_Window* window) const { SDL_DestroyWindow(window); }
+    void operator()(SDL_Window* old) const { SDL_DestroyWindow(old); }
   };
 
   Video video;

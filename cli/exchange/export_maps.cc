@@ -3,6 +3,7 @@
 #include "cli/exchange/targets.h"
 #include "core/error.h"
 #include "core/json.h"
+#include "core/provenance.h"
 
 namespace nacre::exchange {
 namespace {
@@ -42,6 +43,7 @@ const Target* FindTarget(const std::string& name) {
 
 Json ExportMaps(const Target& target,
                 const ProfileFit& fit,
+                const fs::path& file,
                 const std::string& source,
                 const fs::path& folder) {
   const std::size_t count = fit.maps.channels.size();
@@ -51,6 +53,8 @@ Json ExportMaps(const Target& target,
   }
   fs::create_directories(folder);
   const std::vector<std::string> files = target.write(fit, folder);
+  Provenance provenance{.command = "export", .options = {{"to", target.name}}};
+  provenance.AddInput(file);
   Json json{{"format", "nacre-export"},
             {"target", target.program},
             {"source", source},
@@ -60,7 +64,8 @@ Json ExportMaps(const Target& target,
             {"units", "radii in millimetres unless a file says otherwise"},
             {"fit", fit.summary.ToJson()},
             {"lost", target.lost},
-            {"files", files}};
+            {"files", files},
+            {"provenance", ParseJson(provenance.ToString(), "provenance")}};
   WriteJson(folder / "export.json", json);
   return json;
 }

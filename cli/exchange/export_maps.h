@@ -22,9 +22,11 @@ const std::vector<Target>& Targets();
 const Target* FindTarget(const std::string& name);
 
 /// Writes the target's files and `export.json` (units, residual of the fit, what was
-/// lost) into `folder`. Throws UsageError unless the maps have one channel or R, G, B.
+/// lost, provenance) into `folder`. `file` is what the fit is of, `source` its name for
+/// people. Throws UsageError unless the maps have one channel or R, G, B.
 Json ExportMaps(const Target& target,
                 const ProfileFit& fit,
+                const std::filesystem::path& file,
                 const std::string& source,
                 const std::filesystem::path& folder);
 

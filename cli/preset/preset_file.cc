@@ -39,10 +39,22 @@ std::string FileName(const TomlTable& table, const std::string& key) {
   return name;
 }
 
+// A preset is somebody else's folder: what its links lead to isn't its own.
+void RefuseLinkOut(const TomlTable& files,
+                   const std::string& role,
+                   const Preset& preset) {
+  const fs::path file = fs::weakly_canonical(preset.File(role));
+  if (file.parent_path() != fs::weakly_canonical(preset.folder)) {
+    throw files.At(role,
+                   "a link to " + file.string() + ", outside of the preset's folder");
+  }
+}
+
 void ReadFiles(const TomlTable& files, Preset& preset) {
   const TomlTable hashes = files.Table("xxh3");
   for (const std::string& role : Roles()) {
     preset.files[role] = FileName(files, role);
+    RefuseLinkOut(files, role, preset);
     preset.hashes[role] = hashes.Text(role);
   }
   hashes.RejectUnknownKeys();

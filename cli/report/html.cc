@@ -144,9 +144,11 @@ std::string Section(const std::string& title,
 
 std::string Page(const std::string& title,
                  const std::string& lead,
-                 const std::string& body) {
+                 const std::string& body,
+                 const std::string& provenance) {
   return fmt::format(R"(<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8">
+<meta name="nacre.provenance" content="{5}">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>{0}</title>
@@ -161,7 +163,8 @@ std::string Page(const std::string& title,
                      StyleSheet(),
                      lead.empty() ? "" : "<p class=\"lead\">" + lead + "</p>",
                      body,
-                     Version());
+                     Version(),
+                     Escape(provenance));
 }
 
 std::string Number(double value, int digits) {

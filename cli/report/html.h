@@ -55,10 +55,11 @@ std::string Section(const std::string& title,
                     const std::string& origin,
                     const std::string& body);
 
-/// The whole document. `lead` is HTML.
+/// The whole document. `lead` is HTML; `provenance`, JSON, is in its head, unseen.
 std::string Page(const std::string& title,
                  const std::string& lead,
-                 const std::string& body);
+                 const std::string& body,
+                 const std::string& provenance);
 
 /// A number to `digits` significant ones, powers of ten as such: 1.23 × 10⁻⁵. HTML.
 std::string Number(double value, int digits = 3);

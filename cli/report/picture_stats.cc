@@ -79,10 +79,10 @@ double NoiseOf(const ExrPart& picture, const ExrPart& variance) {
 }
 
 std::string PlaneFigure(const ExrPart& part, const std::string& caption) {
-  constexpr int kMaxSide = 480;
+  constexpr int kPlaneSide = 480;
   const ChannelStats stats = StatsOf(part, 0);
-  const OwnedPlane small =
-      Shrink({part.width, part.height, {part.Channel(0), part.PixelCount()}}, kMaxSide);
+  const OwnedPlane small = Shrink(
+      {part.width, part.height, {part.Channel(0), part.PixelCount()}}, kPlaneSide);
   return Figure(ImageTag(LinearImage(small.View(), 0, stats.largest), part.name),
                 fmt::format("{}, up to {}.", caption, Number(stats.largest)),
                 "narrow");

@@ -8,6 +8,7 @@
 #endif
 #include "core/error.h"
 #include "core/json.h"
+#include "core/provenance.h"
 
 #include <algorithm>
 #include <fmt/format.h>
@@ -137,6 +138,26 @@ std::string FolderLead(std::vector<Found> found) {
       fmt::format("From measurement to picture: {}.", fmt::join(names, ", ")));
 }
 
+// Of "a/b/", ".", or a file.
+std::string NameOf(const fs::path& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
+// A session is known by its two files, a preset by its own.
+void AddInputs(const Found& found, Provenance& provenance) {
+  if (!fs::is_directory(found.path)) {
+    provenance.AddInput(found.path);
+    return;
+  }
+  for (const char* name : {"session.json", "journal", "preset.toml"}) {
+    if (fs::exists(found.path / name)) {
+      provenance.AddInput(found.path / name);
+      provenance.inputs.back()["file"] = fs::path(NameOf(found.path)) / name;
+    }
+  }
+}
+
 std::string FolderReport(const fs::path& folder, const ProgressFunction& progress) {
   const fs::path books = folder / "stages.json";
   const Json stages = fs::exists(books) ? ReadJson(books) : Json::object();
@@ -146,6 +167,12 @@ std::string FolderReport(const fs::path& folder, const ProgressFunction& progres
     throw BadData(folder.string() +
                   ": holds no dataset, material, session, calibration or picture to "
                   "report on");
+  }
+  const std::string name = NameOf(folder);
+  Provenance provenance{.command = "report"};
+  provenance.inputs.push_back({{"folder", name}});
+  for (const Found& f : found) {
+    AddInputs(f, provenance);
   }
   // The picture at the end of the line is what the page opens with.
   std::string body;
@@ -168,8 +195,10 @@ std::string FolderReport(const fs::path& folder, const ProgressFunction& progres
     const bool brief = last_dataset != found.rend() && &f != &*last_dataset;
     body += SectionOn(f, brief, progress);
   }
-  const std::string name = fs::absolute(folder).lexically_normal().filename().string();
-  return Page("Nacre report" + (name.empty() ? "" : ": " + name), lead, body);
+  return Page("Nacre report" + (name.empty() ? "" : ": " + name),
+              lead,
+              body,
+              provenance.ToString());
 }
 
 }  // namespace
@@ -186,9 +215,14 @@ std::string BuildReport(const fs::path& named, const ProgressFunction& progress)
   if (fs::is_directory(path) && kind == ArtefactKind::kUnknown) {
     return FolderReport(path, progress);
   }
-  return Page("Nacre report: " + path.filename().string(),
-              "",
-              SectionOn({path, kind}, false, progress));
+  const Found found{path, kind};
+  const std::string section = SectionOn(found, false, progress);
+  Provenance provenance{.command = "report"};
+  if (fs::is_directory(path)) {
+    provenance.inputs.push_back({{"folder", NameOf(path)}});
+  }
+  AddInputs(found, provenance);
+  return Page("Nacre report: " + NameOf(path), "", section, provenance.ToString());
 }
 
 }  // namespace nacre::cli::report

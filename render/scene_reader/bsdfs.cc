@@ -5,8 +5,6 @@
 namespace nacre::render {
 namespace {
 
-constexpr Color kWhite{1, 1, 1};
-
 struct Metal {
   const char* name;
   Color eta;

@@ -10,6 +10,8 @@
 
 namespace nacre::render {
 
+inline constexpr Color kWhite{1, 1, 1};
+
 /// An object of the scene (`<bsdf type="…">`, `<film …>`) with its parameters. Each
 /// getter marks its parameter as known; Finish() then complains of the ones that nobody
 /// asked for, naming the nearest that somebody did.

@@ -7,8 +7,6 @@
 namespace nacre::render {
 namespace {
 
-constexpr Color kWhite{1, 1, 1};
-
 Vec3 Direction(Element& element) {
   if (element.Has("direction")) {
     if (element.Has("toWorld")) {

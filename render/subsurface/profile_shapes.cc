@@ -10,8 +10,8 @@
 namespace nacre::render {
 namespace {
 
-constexpr double kStep = 0.02;     // of a parameter
-constexpr double kPerOctave = 16;  // of squared distance
+constexpr double kShapeStep = 0.02;  // of a parameter
+constexpr double kPerOctave = 16;    // of squared distance
 constexpr double kNearestDiscs = 0.1;
 constexpr double kFarDiscs = 4;  // from here on a disc is a point
 
@@ -19,12 +19,12 @@ constexpr std::int32_t kZero = std::numeric_limits<std::int32_t>::min();
 
 std::int32_t Rounded(float value) {
   return value > 0 ? static_cast<std::int32_t>(
-                         std::lround(std::log(static_cast<double>(value)) / kStep))
+                         std::lround(std::log(static_cast<double>(value)) / kShapeStep))
                    : kZero;
 }
 
 double Value(std::int32_t rounded) {
-  return rounded == kZero ? 0 : std::exp(kStep * rounded);
+  return rounded == kZero ? 0 : std::exp(kShapeStep * rounded);
 }
 
 /// The rounded parameter below a value, and how far that is on the way to the next.
@@ -38,7 +38,8 @@ Between Around(float value) {
     return {kZero, 0};
   }
   const auto exact = static_cast<double>(value);
-  const auto below = static_cast<std::int32_t>(std::floor(std::log(exact) / kStep));
+  const auto below =
+      static_cast<std::int32_t>(std::floor(std::log(exact) / kShapeStep));
   const double share = (exact - Value(below)) / (Value(below + 1) - Value(below));
   return {below, std::clamp(share, 0.0, 1.0)};
 }

@@ -10,7 +10,7 @@
 namespace nacre::rigs::internal {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
+constexpr double kModelDegree = std::numbers::pi / 180;
 
 // One value a laser channel, or one for all.
 std::vector<double> PerChannel(const TomlTable& table,
@@ -51,8 +51,8 @@ PinholeCamera ReadGeometry(const TomlTable& table) {
                  .p2 = table.Number("p2", -3e-4, lens)};
   camera.camera_from_sample =
       LookAtOrigin(distance_mm,
-                   table.Number("tilt_deg", 12, Range{0, 45}) * kDegree,
-                   table.Number("azimuth_deg", -90, Range{-360, 360}) * kDegree);
+                   table.Number("tilt_deg", 12, Range{0, 45}) * kModelDegree,
+                   table.Number("azimuth_deg", -90, Range{-360, 360}) * kModelDegree);
   return camera;
 }
 
@@ -91,19 +91,22 @@ LaserModel ReadLaser(const TomlTable& table,
   laser.distance_mm = table.Number("distance_mm", laser.distance_mm, Range{1, 1e5});
   laser.separation_mm =
       table.Number("separation_mm", laser.separation_mm, Range{0, 1e3});
-  laser.rotation_rad = table.Number("rotation_deg", 0.4, Range{-180, 180}) * kDegree;
+  laser.rotation_rad =
+      table.Number("rotation_deg", 0.4, Range{-180, 180}) * kModelDegree;
   const std::vector<double> offset_mm =
       table.Numbers("offset_mm", {1.2, -0.8}, Range{-1e3, 1e3});
   if (offset_mm.size() != 2) {
     throw table.At("offset_mm", "expected two numbers, [x, y]");
   }
   laser.offset_mm = {offset_mm[0], offset_mm[1]};
-  laser.max_angle_rad = table.Number("max_angle_deg", 17, Range{0.1, 60}) * kDegree;
+  laser.max_angle_rad =
+      table.Number("max_angle_deg", 17, Range{0.1, 60}) * kModelDegree;
   laser.has_dac = table.Boolean("dac", false);
   laser.spot_sigma_mm =
       table.Number("spot_sigma_mm", laser.spot_sigma_mm, Range{1e-3, 1e2});
   laser.spot_aspect = table.Number("spot_aspect", 1, Range{1, 10});
-  laser.spot_angle_rad = table.Number("spot_angle_deg", 0, Range{-180, 180}) * kDegree;
+  laser.spot_angle_rad =
+      table.Number("spot_angle_deg", 0, Range{-180, 180}) * kModelDegree;
   laser.hysteresis_rad = 1e-3 * table.Number("hysteresis_mrad", 0, Range{-100, 100});
   light_noise = ReadListed<LightNoiseModel>(table);
   table.RejectUnknownKeys();
@@ -156,9 +159,10 @@ SamplePose ReadSample(const std::optional<TomlTable>& table, CameraModel& camera
   SamplePose pose;
   if (table) {
     pose.height_mm = table->Number("height_mm", 0, Range{-20, 20});
-    const double tilt = std::tan(table->Number("tilt_deg", 0, Range{0, 20}) * kDegree);
+    const double tilt =
+        std::tan(table->Number("tilt_deg", 0, Range{0, 20}) * kModelDegree);
     const double azimuth =
-        table->Number("tilt_azimuth_deg", 0, Range{-360, 360}) * kDegree;
+        table->Number("tilt_azimuth_deg", 0, Range{-360, 360}) * kModelDegree;
     pose.slope_x = tilt * std::cos(azimuth);
     pose.slope_y = tilt * std::sin(azimuth);
     camera.specular_reflectance =

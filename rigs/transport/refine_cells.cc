@@ -9,7 +9,7 @@ namespace nacre::rigs {
 namespace {
 
 constexpr int kOrder = 3;
-constexpr std::size_t kNodes = std::size_t{kOrder} * kOrder;  // of a box
+constexpr std::size_t kCellNodes = std::size_t{kOrder} * kOrder;  // of a box
 
 struct Box {
   std::size_t cell;
@@ -24,7 +24,7 @@ std::vector<double> MeansOf(std::span<const Box> boxes,
                             std::size_t channels,
                             const WindowFunction& function) {
   static const internal::GaussRule kRule = internal::GaussLegendre(kOrder);
-  const std::size_t count = boxes.size() * kNodes;
+  const std::size_t count = boxes.size() * kCellNodes;
   std::vector<float> x;
   std::vector<float> y;
   x.reserve(count);
@@ -43,9 +43,9 @@ std::vector<double> MeansOf(std::span<const Box> boxes,
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     for (std::size_t c = 0; c < channels; ++c) {
       double sum = 0;
-      for (std::size_t k = 0; k < kNodes; ++k) {
+      for (std::size_t k = 0; k < kCellNodes; ++k) {
         sum += 0.25 * kRule.weight[k / kOrder] * kRule.weight[k % kOrder] *
-               static_cast<double>(value[c * count + b * kNodes + k]);
+               static_cast<double>(value[c * count + b * kCellNodes + k]);
       }
       means[b * channels + c] = sum;
     }

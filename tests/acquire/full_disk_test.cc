@@ -26,7 +26,7 @@ using testing::TestRig;
 
 constexpr int kNotAllowed = 77;
 
-void CaptureAll(SessionWriter& session, FakeRig& fake) {
+void CapturePictures(SessionWriter& session, FakeRig& fake) {
   CaptureCalibration(session, fake.devices());
   CaptureGrid(session, fake.devices(), IdealScanMap(300));
 }
@@ -62,7 +62,7 @@ int FillAndGoOn(const std::filesystem::path& disk,
   bool full = false;
   try {
     auto session = SessionWriter::Create(folder, manifest, false);
-    CaptureAll(session, fake);
+    CapturePictures(session, fake);
   } catch (const Error& e) {
     full = std::string(e.what()).find("No space left on device") != std::string::npos;
     if (!full) {
@@ -84,7 +84,7 @@ int FillAndGoOn(const std::filesystem::path& disk,
   auto session = std::filesystem::exists(folder / "session.json")
                      ? SessionWriter::Resume(folder, manifest, false)
                      : SessionWriter::Create(folder, manifest, false);
-  CaptureAll(session, fake);
+  CapturePictures(session, fake);
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename().string();
     if (name != "frames" && name != "journal" && name != "lock" &&
@@ -102,7 +102,7 @@ TEST(FullDisk, StopsResumablyWithNothingCorrupt) {
     const TempFolder folder;
     FakeRig fake;
     auto session = SessionWriter::Create(folder / "s", fake.Manifest(TestRig()), false);
-    CaptureAll(session, fake);
+    CapturePictures(session, fake);
     expected = ReadFile(folder / "s" / "journal");
   }
   for (const int kilobytes : {16, 24, 60, 100, 116, 120, 124, 128, 200, 300}) {

@@ -3,6 +3,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "tests/support/error_message.h"
 #include "tests/support/temp_folder.h"
 
 #include <gmock/gmock.h>
@@ -138,6 +139,18 @@ TEST(Journal, DamageNamesTheLine) {
   } catch (const Error& e) {
     EXPECT_EQ(e.code(), ExitCode::kBadData);
     EXPECT_THAT(e.what(), ::testing::HasSubstr("journal:2: this line is damaged"));
+  }
+}
+
+TEST(Journal, PicturesLieInTheSession) {
+  for (const char* file :
+       {"/etc/passwd", "../other/000001.pgm", "frames/../../x", ""}) {
+    JournalEntry entry = EntryOf(0);
+    entry.file = file;
+    EXPECT_THAT(nacre::testing::ErrorMessage(
+                    [&] { ParseJournal(FormatJournalLine(entry), "journal"); }),
+                ::testing::HasSubstr("journal:1: field 'file': '"))
+        << file;
   }
 }
 

@@ -195,6 +195,17 @@ TEST(Remake, ImportsAndPresetsToo) {
   RunJson(words);
   EXPECT_EQ(ReadFile(folder / "a.rd.exr"), ReadFile(folder / "b.rd.exr"));
 
+  for (const std::filesystem::path& path : {folder / "a.rd.exr", folder / "."}) {
+    RunJson({"report", path, "--out", folder / "page.html"});
+    const Json of = RunJson({"inspect", folder / "page.html", "--provenance"});
+    const bool is_file = path.filename() == "a.rd.exr";
+    EXPECT_EQ(of.at("inputs").size(), is_file ? 1U : 3U) << "the folder, and two in it";
+    EXPECT_THAT(
+        of.at("commands").back().get<std::string>(),
+        ::testing::MatchesRegex(is_file ? "nacre report a.rd.exr --out page.html"
+                                        : "nacre report .* --out page.html"));
+  }
+
   const Json made{{"command", "factor"},
                   {"options", {{"terms", 2}}},
                   {"inputs", Json::array({{{"dataset", Json()}}})}};

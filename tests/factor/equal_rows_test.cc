@@ -3,6 +3,7 @@
 #include "factor/internal/equal_rows.h"
 
 #include "factor/factor.h"
+#include "tests/factor/expect.h"
 #include "tests/factor/synthetic.h"
 
 #include <gmock/gmock.h>
@@ -14,6 +15,7 @@
 namespace nacre::factor {
 namespace {
 
+using nacre::testing::ExpectNear;
 using nacre::testing::MakeChessboard;
 using reconstruct::RdDataset;
 using ::testing::Contains;
@@ -48,15 +50,6 @@ RdDataset MakeDistinct(RdDataset dataset) {
     *flag = static_cast<std::uint8_t>(2 + slice);
   }
   return dataset;
-}
-
-void ExpectNear(const std::vector<float>& a,
-                const std::vector<float>& b,
-                double bound) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t n = 0; n < a.size(); ++n) {
-    ASSERT_NEAR(static_cast<double>(a[n]), static_cast<double>(b[n]), bound) << n;
-  }
 }
 
 class EqualRows : public ::testing::TestWithParam<const char*> {};

@@ -4,6 +4,7 @@
 #include "core/random.h"
 #include "factor/factor.h"
 #include "factor/internal/reciprocal_taps.h"
+#include "tests/factor/expect.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
 
@@ -15,6 +16,7 @@
 namespace nacre::factor {
 namespace {
 
+using nacre::testing::ExpectReciprocal;
 using nacre::testing::MakeChessboard;
 using nacre::testing::TempFolder;
 using reconstruct::RdDataset;
@@ -26,31 +28,6 @@ FactorOptions Reciprocal(int terms, int taps = 3) {
   options.terms = terms;
   options.taps = taps;
   return options;
-}
-
-// To the last bit, for every pair of points of the grid, and never negative.
-void ExpectReciprocal(const Material& m) {
-  const int radius = (m.core - 1) / 2;
-  std::vector<float> window(static_cast<std::size_t>(m.WindowSize()));
-  for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
-    for (int j = 0; j < m.points_y; ++j) {
-      for (int i = 0; i < m.points_x; ++i) {
-        m.EvaluateWindow(c, i, j, window.data());
-        for (int v = 0; v < m.core; ++v) {
-          for (int u = 0; u < m.core; ++u) {
-            const float there = m.Evaluate(c, i, j, u, v);
-            ASSERT_EQ(there, window[static_cast<std::size_t>(v * m.core + u)]);
-            ASSERT_GE(there, 0);
-            const int x = i + u - radius;
-            const int y = j + v - radius;
-            if (x >= 0 && y >= 0 && x < m.points_x && y < m.points_y) {
-              ASSERT_EQ(there, m.Evaluate(c, x, y, m.core - 1 - u, m.core - 1 - v));
-            }
-          }
-        }
-      }
-    }
-  }
 }
 
 double ErrorAgainst(const RdDataset& truth, const Material& m) {

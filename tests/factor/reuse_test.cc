@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "factor/factor.h"
+#include "tests/factor/expect.h"
 #include "tests/factor/synthetic.h"
 
 #include <gmock/gmock.h>
@@ -13,19 +14,11 @@
 namespace nacre::factor {
 namespace {
 
+using nacre::testing::ExpectNear;
 using nacre::testing::MakeChessboard;
 using reconstruct::RdDataset;
 using ::testing::Contains;
 using ::testing::HasSubstr;
-
-void ExpectNear(const std::vector<float>& a,
-                const std::vector<float>& b,
-                double bound) {
-  ASSERT_EQ(a.size(), b.size());
-  for (std::size_t n = 0; n < a.size(); ++n) {
-    ASSERT_NEAR(static_cast<double>(a[n]), static_cast<double>(b[n]), bound) << n;
-  }
-}
 
 class Reuse : public ::testing::TestWithParam<const char*> {};
 

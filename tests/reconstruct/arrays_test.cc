@@ -27,7 +27,7 @@ using testing::TempFolder;
 
 // 2 rows, 3 columns, windows of 5 x 5, 2 channels, each value different.
 constexpr int kY = 2, kX = 3, kCore = 5, kC = 2;
-float ValueAt(int y, int x, int v, int u, int c) {
+float ArrayValue(int y, int x, int v, int u, int c) {
   return static_cast<float>((((y * 10 + x) * 10 + v) * 10 + u) * 10 + c) * 0.25F;
 }
 
@@ -35,11 +35,11 @@ float ValueAt(int y, int x, int v, int u, int c) {
 std::vector<float> Values() {
   std::vector<float> values;
   for (int n = 0; n < kY * kX * kCore * kCore * kC; ++n) {
-    values.push_back(ValueAt(n / (kX * kCore * kCore * kC),
-                             n / (kCore * kCore * kC) % kX,
-                             n / (kCore * kC) % kCore,
-                             n / kC % kCore,
-                             n % kC));
+    values.push_back(ArrayValue(n / (kX * kCore * kCore * kC),
+                                n / (kCore * kCore * kC) % kX,
+                                n / (kCore * kC) % kCore,
+                                n / kC % kCore,
+                                n % kC));
   }
   return values;
 }
@@ -94,8 +94,8 @@ void ExpectValues(const RdDataset& dataset, bool bottom_first = false) {
         for (int v = 0; v < kCore; ++v) {
           for (int u = 0; u < kCore; ++u, ++at) {
             ASSERT_EQ(dataset.rd[at],
-                      bottom_first ? ValueAt(kY - 1 - y, x, kCore - 1 - v, u, c)
-                                   : ValueAt(y, x, v, u, c));
+                      bottom_first ? ArrayValue(kY - 1 - y, x, kCore - 1 - v, u, c)
+                                   : ArrayValue(y, x, v, u, c));
           }
         }
       }
@@ -197,11 +197,11 @@ TEST(Npy, TruncatedAndHostileFilesAreRefused) {
 std::vector<double> MatlabValues() {
   std::vector<double> values;
   for (int n = 0; n < kY * kX * kCore * kCore * kC; ++n) {
-    values.push_back(static_cast<double>(ValueAt(n % kY,
-                                                 n / kY % kX,
-                                                 n / (kY * kX) % kCore,
-                                                 n / (kY * kX * kCore) % kCore,
-                                                 n / (kY * kX * kCore * kCore))));
+    values.push_back(static_cast<double>(ArrayValue(n % kY,
+                                                    n / kY % kX,
+                                                    n / (kY * kX) % kCore,
+                                                    n / (kY * kX * kCore) % kCore,
+                                                    n / (kY * kX * kCore * kCore))));
   }
   return values;
 }

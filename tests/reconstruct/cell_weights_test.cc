@@ -71,7 +71,7 @@ calibrate::CameraGeometry Camera(double turn_rad) {
   return camera;
 }
 
-RdHeader Header() {
+RdHeader WeightsHeader() {
   RdHeader header;
   header.points_x = 6;
   header.points_y = 4;
@@ -123,7 +123,7 @@ double GaussianCell(double x, double y, double pitch, double variance) {
 
 TEST(CellWeights, EvenLightIsEven) {
   const auto camera = Camera(0.1);
-  const CellLattice lattice{Header()};
+  const CellLattice lattice{WeightsHeader()};
   const CellWeights plain(lattice, camera, {}, 1);
   const CellWeights sharp(lattice, camera, Round(0.3), 1);
   const RateFrame frame = Picture(camera, [](double, double) { return 7.0; });
@@ -141,7 +141,7 @@ TEST(CellWeights, EvenLightIsEven) {
 TEST(CellWeights, APeakTwoPixelsWideIsBinnedExactly) {
   for (const double turn : {0.0, 0.1, 0.7}) {
     const auto camera = Camera(turn);
-    const RdHeader header = Header();
+    const RdHeader header = WeightsHeader();
     const CellLattice lattice{header};
     const CellWeights weights(lattice, camera, {}, 1);
     const double variance = 0.6 * 0.6;
@@ -164,7 +164,7 @@ TEST(CellWeights, APeakTwoPixelsWideIsBinnedExactly) {
 
 TEST(CellWeights, SharpeningUndoesTheSpotsWidth) {
   const auto camera = Camera(0.1);
-  const CellLattice lattice{Header()};
+  const CellLattice lattice{WeightsHeader()};
   const double variance = 0.8 * 0.8;
   const double spot = 0.25;
   const RateFrame blurred = Picture(camera, [&](double x, double y) {
@@ -189,7 +189,7 @@ TEST(CellWeights, SharpeningUndoesTheSpotsWidth) {
 TEST(CellWeights, CellsThatAreNotSeenAreNotValid) {
   auto camera = Camera(0);
   camera.width_px = 40;  // of the 14 columns of cells, the right half is out of view
-  const CellLattice lattice{Header()};
+  const CellLattice lattice{WeightsHeader()};
   const CellWeights weights(lattice, camera, Round(0.1), 1);
   const RateFrame frame = Picture(camera, [](double, double) { return 1.0; });
   EXPECT_TRUE(weights.Mean(frame, lattice.Index(4, 5)).valid);
@@ -198,7 +198,7 @@ TEST(CellWeights, CellsThatAreNotSeenAreNotValid) {
 
 TEST(CellWeights, ASaturatedPixelSpoilsItsCell) {
   const auto camera = Camera(0);
-  const CellLattice lattice{Header()};
+  const CellLattice lattice{WeightsHeader()};
   const CellWeights weights(lattice, camera, {}, 1);
   RateFrame frame = Picture(camera, [](double, double) { return 1.0; });
   const auto pixel = camera.PixelFromSample({1, 1});

@@ -20,7 +20,7 @@ RdSlice Falling(const RdHeader& header) {
   return slice;
 }
 
-RdHeader Header() {
+RdHeader FloorHeader() {
   RdHeader header;
   header.points_x = 1;
   header.points_y = 1;
@@ -31,7 +31,7 @@ RdHeader Header() {
 }
 
 TEST(GlareFloor, MarksWhatIsBelow) {
-  const RdHeader header = Header();
+  const RdHeader header = FloorHeader();
   RdSlice slice = Falling(header);
   // Values are 10, 9, … 2, the mean of three in a row too, but at the rims.
   std::vector<float> floor(slice.rd.size(), 5.25F);
@@ -42,7 +42,7 @@ TEST(GlareFloor, MarksWhatIsBelow) {
 }
 
 TEST(GlareFloor, ACellThatNoiseRaisedIsMarkedWithItsNeighbours) {
-  const RdHeader header = Header();
+  const RdHeader header = FloorHeader();
   RdSlice slice = MakeSlice(header);
   slice.rd[40] = 8.5F;  // alone among zeros
   const std::vector<float> floor(slice.rd.size(), 1.0F);
@@ -50,7 +50,7 @@ TEST(GlareFloor, ACellThatNoiseRaisedIsMarkedWithItsNeighbours) {
 }
 
 TEST(GlareFloor, WithoutGlareNothingIsMarked) {
-  const RdHeader header = Header();
+  const RdHeader header = FloorHeader();
   RdSlice slice = MakeSlice(header);
   slice.rd[3] = -1.0F;
   EXPECT_EQ(MarkBelowFloor(header, std::vector<float>(slice.rd.size(), 0.0F), slice),

@@ -48,13 +48,13 @@ std::vector<float> RandomValues(std::size_t count, std::uint64_t seed) {
   return values;
 }
 
-ImportOptions Options() {
+ImportOptions PsfOptions() {
   return {.pitch_mm = 0.25, .eta = 1.5};
 }
 
 std::string ImportError(const TempFolder& folder,
                         const std::string& bytes,
-                        const ImportOptions& options = Options()) {
+                        const ImportOptions& options = PsfOptions()) {
   WriteFile(folder / "in.psf", bytes);
   try {
     ImportPsf(folder / "in.psf", folder / "out.rd.exr", options);
@@ -79,10 +79,10 @@ TEST(Psf, ImportAndExportGiveTheSameBytes) {
     values.back() = std::numeric_limits<float>::denorm_min();
     const std::string bytes = PsfBytes(width, height, k, values);
     WriteFile(folder / "a.psf", bytes);
-    ImportPsf(folder / "a.psf", folder / "a.rd.exr", Options());
+    ImportPsf(folder / "a.psf", folder / "a.rd.exr", PsfOptions());
     ExportPsf(folder / "a.rd.exr", folder / "b.psf", {});
     EXPECT_EQ(ReadFile(folder / "b.psf"), bytes) << "seed " << seed;
-    ImportPsf(folder / "b.psf", folder / "b.rd.exr", Options());
+    ImportPsf(folder / "b.psf", folder / "b.rd.exr", PsfOptions());
     EXPECT_EQ(ReadDataset(folder / "b.rd.exr").rd, ReadDataset(folder / "a.rd.exr").rd);
   }
 }
@@ -98,7 +98,7 @@ TEST(Psf, RowsAndWindowsAreFlippedIntoPictureOrder) {
   }
   WriteFile(folder / "a.psf", PsfBytes(width, height, k, values));
   const ImportSummary summary =
-      ImportPsf(folder / "a.psf", folder / "a.rd.exr", Options());
+      ImportPsf(folder / "a.psf", folder / "a.rd.exr", PsfOptions());
   EXPECT_EQ(summary.points_x, 2);
   EXPECT_EQ(summary.points_y, 3);
   const RdDataset dataset = ReadDataset(folder / "a.rd.exr");
@@ -162,7 +162,7 @@ TEST(Psf, ValuesThatAreNoRdAreNamed) {
   EXPECT_THAT(ImportError(folder, with(-1.0F)), place);
 
   WriteFile(folder / "in.psf", with(-1.0F));
-  ImportOptions options = Options();
+  ImportOptions options = PsfOptions();
   options.clamp_negative = true;
   EXPECT_EQ(ImportPsf(folder / "in.psf", folder / "x.rd.exr", options).clamped_count,
             1);

@@ -239,7 +239,7 @@ TEST(BsdfTest, DielectricRefractsBySnellAndKeepsRadianceOverIndexSquared) {
 
 // Over both sides: flux is kept by Sample (weights undone by η² where light refracts),
 // follows its density, and crosses both ways alike: f(a → b) / η_b² is symmetric.
-class RoughGlassTest : public testing::TestWithParam<Microfacet> {
+class RoughGlassTest : public ::testing::TestWithParam<Microfacet> {
  protected:
   static constexpr float kEta = 1.5F;
   BsdfPtr glass_ = MakeRoughDielectric({kEta, Grey(1), Grey(1)}, GetParam());
@@ -315,10 +315,10 @@ TEST_P(RoughGlassTest, IsReciprocal) {
 
 INSTANTIATE_TEST_SUITE_P(Facets,
                          RoughGlassTest,
-                         testing::Values(Microfacet{Microfacet::Kind::kGgx, 0.3F},
-                                         Microfacet{Microfacet::Kind::kGgx, 0.8F},
-                                         Microfacet{Microfacet::Kind::kBeckmann,
-                                                    0.4F}));
+                         ::testing::Values(Microfacet{Microfacet::Kind::kGgx, 0.3F},
+                                           Microfacet{Microfacet::Kind::kGgx, 0.8F},
+                                           Microfacet{Microfacet::Kind::kBeckmann,
+                                                      0.4F}));
 
 TEST(FresnelTest, SinglePrecisionAgreesWithTheDoubleOne) {
   for (const float eta : {1 / 1.5F, 1.0F, 1.3F, 1.5F, 2.4F}) {

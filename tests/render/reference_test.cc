@@ -18,11 +18,6 @@ RenderOptions With(const std::string& integrator, int spp) {
   return options;
 }
 
-const char* const kDipole =
-    R"(<subsurface type="dipole"><rgb name="sigmaS" value="1, 2, 3"/>
-  <rgb name="sigmaA" value="0.05, 0.02, 0.01"/><float name="scale" value="5"/>
-  </subsurface>)";
-
 const char* const kLights = R"(
   <emitter type="directional"><vector name="direction" x="1" y="-0.5" z="-1"/>
     <rgb name="irradiance" value="3"/></emitter>

@@ -10,15 +10,10 @@
 namespace nacre::render::testing {
 namespace {
 
-const char* const kDipole =
-    R"(<subsurface type="dipole"><rgb name="sigmaS" value="1, 2, 3"/>
-  <rgb name="sigmaA" value="0.05, 0.02, 0.01"/><float name="scale" value="5"/>
-  </subsurface>)";
-
 const char* const kSun = R"(
   <emitter type="directional"><vector name="direction" x="1" y="-0.5" z="-1"/>
     <rgb name="irradiance" value="3"/></emitter>)";
-const char* const kSky = R"(
+const char* const kPaleSky = R"(
   <integrator type="path"><boolean name="hideEmitters" value="true"/></integrator>
   <emitter type="constant"><rgb name="radiance" value="0.2, 0.3, 0.4"/></emitter>)";
 
@@ -37,7 +32,7 @@ TEST(RightTest, FastIsReferenceOnSlabSphereAndCube) {
         "<shape type=\"sphere\">",
         "<shape type=\"cube\">"}) {
     const Scene scene =
-        Parse(SceneText(std::string(kSun) + kSky + shape + kDipole + "</shape>",
+        Parse(SceneText(std::string(kSun) + kPaleSky + shape + kDipole + "</shape>",
                         "3, 4, 6",
                         "0, 0, 0",
                         8));

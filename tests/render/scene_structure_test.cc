@@ -117,7 +117,7 @@ TEST(TextureTransformTest, TurnsBeforeItScales) {
   EXPECT_NEAR(reflectance({0.7F, 0.1F}), 1, 1e-6);  // −1 + 1
 }
 
-const char* const kLamp = R"(<emitter type="point">
+const char* const kPointLight = R"(<emitter type="point">
   <point name="position" x="2" y="3" z="8"/><rgb name="intensity" value="50"/></emitter>)";
 
 double Difference(const ExrPart& a, const ExrPart& b) {
@@ -128,10 +128,11 @@ double Difference(const ExrPart& a, const ExrPart& b) {
   return most;
 }
 
-ExrPart Picture(const std::string& shapes) {
+ExrPart PictureOf(const std::string& shapes) {
   RenderOptions options;
   options.spp = 16;
-  return Render(Parse(SceneText(kLamp + shapes, "0, 0, 12", "0, 0, 0", 24)), options)
+  return Render(Parse(SceneText(kPointLight + shapes, "0, 0, 12", "0, 0, 0", 24)),
+                options)
       .image;
 }
 
@@ -151,10 +152,10 @@ TEST(InstanceTest, IsThePictureOfShapesWrittenOut) {
     return R"(<shape type="instance"><ref id="both"/><transform name="toWorld">)" +
            transform + "</transform></shape>";
   };
-  const ExrPart written = Picture(shapes(first) + shapes(second));
+  const ExrPart written = PictureOf(shapes(first) + shapes(second));
   const ExrPart instanced =
-      Picture("<shape type=\"shapegroup\" id=\"both\">" + shapes("") + "</shape>" +
-              instance(first) + instance(second));
+      PictureOf("<shape type=\"shapegroup\" id=\"both\">" + shapes("") + "</shape>" +
+                instance(first) + instance(second));
   EXPECT_GT(*std::max_element(written.values.begin(), written.values.end()), 0.1F);
   EXPECT_LT(Difference(written, instanced), 2e-3);
 }

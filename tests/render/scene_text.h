@@ -11,6 +11,11 @@
 
 namespace nacre::render::testing {
 
+inline const char* const kDipole =
+    R"(<subsurface type="dipole"><rgb name="sigmaS" value="1, 2, 3"/>
+  <rgb name="sigmaA" value="0.05, 0.02, 0.01"/><float name="scale" value="5"/>
+  </subsurface>)";
+
 /// A scene with a small perspective sensor that looks from `origin` to `target`, and
 /// `body`.
 inline std::string SceneText(const std::string& body,

@@ -12,7 +12,7 @@
 namespace nacre::rigs {
 namespace {
 
-PinholeCamera TestCamera() {
+PinholeCamera CloseCamera() {
   PinholeCamera camera;
   camera.width_px = 150;
   camera.height_px = 150;
@@ -68,7 +68,7 @@ Phantom Lit(const Phantom& phantom, double sigma_mm) {
 // A spot on the reference integrates to ρΦ/π, wherever within a pixel it falls and
 // however small it is, and is where the geometry says.
 TEST(LaserView, ReferenceSpotsKeepTheirFluxAndPlace) {
-  const PinholeCamera camera = TestCamera();
+  const PinholeCamera camera = CloseCamera();
   for (const double sigma_mm : {0.05, 0.12, 0.5}) {
     const LaserView view(
         camera,
@@ -89,7 +89,7 @@ TEST(LaserView, ReferenceSpotsKeepTheirFluxAndPlace) {
 
 // What leaves the sample: Σ L · πc / F_t(θ_o) over the plane is Φ F_t(θ_i) R.
 TEST(LaserView, SampleSpotsKeepTheEnergy) {
-  const PinholeCamera camera = TestCamera();
+  const PinholeCamera camera = CloseCamera();
   const Phantom phantom = testing::Homogeneous(0.1, 3, 10);
   const auto model = std::make_shared<PathAveraged>(Lit(phantom, 0.12));
   const LaserView view(camera, model, 0.12);
@@ -116,7 +116,7 @@ TEST(LaserView, SampleSpotsKeepTheEnergy) {
 // Tiles stand for their pixels, borders of media and of the picture included: pixel by
 // pixel the model itself, everywhere but where a pixel is a mean over its footprint.
 TEST(LaserView, TilesAreTheModelAtEachPixel) {
-  PinholeCamera camera = TestCamera();
+  PinholeCamera camera = CloseCamera();
   camera.width_px = 171;  // not a number of whole tiles
   camera.height_px = 140;
   const PlaneMap map = MapSample(camera);
@@ -165,7 +165,7 @@ TEST(LaserView, TilesAreTheModelAtEachPixel) {
 }
 
 TEST(LaserView, LightAddsUp) {
-  const PinholeCamera camera = TestCamera();
+  const PinholeCamera camera = CloseCamera();
   const auto model = std::make_shared<PathAveraged>(
       Lit(testing::TwoMarbles(PatternType::kChessboard, 4), 0.12));
   const LaserView view(camera, model, 0.12, 1);

@@ -15,24 +15,24 @@ namespace {
 // [Jensen01, fig. 5] prints the diffuse reflectance beside the coefficients: the dipole
 // must give it back. Ketchup and the blue of chicken don't follow in the paper either.
 TEST(Media, JensensCoefficientsGiveHisReflectances) {
-  struct Published {
+  struct Printed {
     const char* name;
     std::array<double, 3> reflectance;
   };
-  constexpr std::array kPublished = {
-      Published{"apple", {0.85, 0.84, 0.53}},
-      Published{"chicken1", {0.31, 0.15, -1}},
-      Published{"chicken2", {0.32, 0.16, -1}},
-      Published{"cream", {0.98, 0.90, 0.73}},
-      Published{"marble", {0.83, 0.79, 0.75}},
-      Published{"potato", {0.77, 0.62, 0.21}},
-      Published{"skimmilk", {0.81, 0.81, 0.69}},
-      Published{"skin1", {0.44, 0.22, 0.13}},
-      Published{"skin2", {0.63, 0.44, 0.34}},
-      Published{"spectralon", {1, 1, 1}},
-      Published{"wholemilk", {0.91, 0.88, 0.76}},
+  constexpr std::array kPrinted = {
+      Printed{"apple", {0.85, 0.84, 0.53}},
+      Printed{"chicken1", {0.31, 0.15, -1}},
+      Printed{"chicken2", {0.32, 0.16, -1}},
+      Printed{"cream", {0.98, 0.90, 0.73}},
+      Printed{"marble", {0.83, 0.79, 0.75}},
+      Printed{"potato", {0.77, 0.62, 0.21}},
+      Printed{"skimmilk", {0.81, 0.81, 0.69}},
+      Printed{"skin1", {0.44, 0.22, 0.13}},
+      Printed{"skin2", {0.63, 0.44, 0.34}},
+      Printed{"spectralon", {1, 1, 1}},
+      Printed{"wholemilk", {0.91, 0.88, 0.76}},
   };
-  for (const Published& p : kPublished) {
+  for (const Printed& p : kPrinted) {
     const NamedMedium* const medium = FindNamedMedium(p.name);
     ASSERT_NE(medium, nullptr) << p.name;
     EXPECT_EQ(medium->source, "Jensen01");

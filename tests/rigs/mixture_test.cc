@@ -4,6 +4,7 @@
 #include "rigs/phantom_noise.h"
 #include "rigs/phantom_stone.h"
 #include "rigs/phantom_voxels.h"
+#include "tests/rigs/phantoms.h"
 
 #include <gtest/gtest.h>
 
@@ -16,19 +17,14 @@ namespace {
 constexpr VoxelLayout kLayout{
     .count = {80, 60, 1}, .size_mm = {0.5, 0.5, 0.5}, .left_mm = -20, .lower_mm = -15};
 
-PointMm Draw(RandomStream& random, double extent_mm) {
-  const double x = (random.Uniform() - 0.5) * extent_mm;
-  return {x, (random.Uniform() - 0.5) * extent_mm};
-}
-
 TEST(Mixture, LinearFieldsAreExact) {
   const Pattern pattern = MixPlane(
       kLayout, [](double x, double y, double) { return 0.5 + 0.012 * x - 0.017 * y; });
   EXPECT_EQ(pattern.MediumCount(), 2);
   RandomStream random(3, 0);
   for (int k = 0; k < 200; ++k) {
-    const PointMm a = Draw(random, k % 2 == 0 ? 25 : 3);
-    const PointMm b = Draw(random, k % 2 == 0 ? 25 : 3);
+    const PointMm a = testing::DrawPoint(random, k % 2 == 0 ? 25 : 3);
+    const PointMm b = testing::DrawPoint(random, k % 2 == 0 ? 25 : 3);
     const double middle = 0.5 + 0.006 * (a.x + b.x) - 0.0085 * (a.y + b.y);
     EXPECT_NEAR(pattern.SecondMediumFraction(a, b), middle, 2e-5);
     EXPECT_NEAR(pattern.SecondMediumFraction(b, a), middle, 2e-5);
@@ -44,8 +40,8 @@ TEST(Mixture, SegmentsAreTheMeansOfManySteps) {
   double sum2 = 0;
   constexpr int kCount = 300;
   for (int k = 0; k < kCount; ++k) {
-    const PointMm a = Draw(random, 40);
-    const PointMm b = Draw(random, 40);
+    const PointMm a = testing::DrawPoint(random, 40);
+    const PointMm b = testing::DrawPoint(random, 40);
     double mean = 0;
     constexpr int kSteps = 2000;
     for (int s = 0; s < kSteps; ++s) {

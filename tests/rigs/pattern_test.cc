@@ -1,6 +1,7 @@
 #include "rigs/pattern.h"
 
 #include "core/random.h"
+#include "tests/rigs/phantoms.h"
 
 #include <gtest/gtest.h>
 
@@ -12,11 +13,6 @@ namespace {
 
 const Pattern kChessboard{.type = PatternType::kChessboard, .cell_mm = 2.5};
 const Pattern kStripes{.type = PatternType::kStripes, .cell_mm = 2.5};
-
-PointMm Draw(RandomStream& random, double extent_mm) {
-  const double x = (random.Uniform() - 0.5) * extent_mm;
-  return {x, (random.Uniform() - 0.5) * extent_mm};
-}
 
 // By asking for the medium at many places along the way.
 double FractionBySteps(const Pattern& pattern, PointMm a, PointMm b) {
@@ -51,8 +47,8 @@ TEST(Pattern, FractionsAreThoseOfManySteps) {
   RandomStream random(7, 0);
   for (const Pattern& pattern : {kChessboard, kStripes}) {
     for (int k = 0; k < 300; ++k) {
-      const PointMm a = Draw(random, 60);
-      const PointMm b = Draw(random, k % 2 == 0 ? 60 : 8);
+      const PointMm a = testing::DrawPoint(random, 60);
+      const PointMm b = testing::DrawPoint(random, k % 2 == 0 ? 60 : 8);
       EXPECT_NEAR(
           pattern.SecondMediumFraction(a, b), FractionBySteps(pattern, a, b), 1e-3)
           << a.x << ", " << a.y << " to " << b.x << ", " << b.y;
@@ -63,8 +59,8 @@ TEST(Pattern, FractionsAreThoseOfManySteps) {
 TEST(Pattern, FractionsAreTheSameBothWays) {
   RandomStream random(8, 0);
   for (int k = 0; k < 2000; ++k) {
-    const PointMm a = Draw(random, 40);
-    const PointMm b = Draw(random, 40);
+    const PointMm a = testing::DrawPoint(random, 40);
+    const PointMm b = testing::DrawPoint(random, 40);
     EXPECT_NEAR(kChessboard.SecondMediumFraction(a, b),
                 kChessboard.SecondMediumFraction(b, a),
                 2e-5);
@@ -99,7 +95,7 @@ TEST(Pattern, AColumnIsItsPoints) {
   std::vector<float> x;
   std::vector<float> y;
   for (int k = 0; k < 333; ++k) {
-    const PointMm p = Draw(random, 50);
+    const PointMm p = testing::DrawPoint(random, 50);
     x.push_back(static_cast<float>(p.x));
     y.push_back(static_cast<float>(p.y));
   }

@@ -268,7 +268,7 @@ TEST(PhantomKinds, MixturesKeepReducedScattering) {
   }
 }
 
-struct Bad {
+struct BadKind {
   std::string text;
   const char* message;
 };
@@ -278,65 +278,72 @@ const std::string kTwo =
 
 TEST(PhantomKinds, BadFilesAreRefusedWithFileAndLine) {
   const std::string layered = "medium = \"marble\"\n[slab]\n";
-  for (const Bad& bad : {
-           Bad{"medium = \"granite\"\n[slab]\nthickness_mm = 1\n",
-               "p.toml:1: medium: 'granite' is not known; known are: apple"},
-           Bad{"channels = [\"638nm\"]\nmedium = \"marble\"\n[slab]\nthickness_mm = "
+  for (const BadKind& bad : {
+           BadKind{"medium = \"granite\"\n[slab]\nthickness_mm = 1\n",
+                   "p.toml:1: medium: 'granite' is not known; known are: apple"},
+           BadKind{
+               "channels = [\"638nm\"]\nmedium = \"marble\"\n[slab]\nthickness_mm = "
                "1\n",
                "p.toml:2: medium: 'marble' was measured in R, G and B"},
-           Bad{"[slab]\nthickness_mm = 1\neta = 1.5\n[[medium]]\nsigma_a_per_mm = 1\n"
+           BadKind{
+               "[slab]\nthickness_mm = 1\neta = 1.5\n[[medium]]\nsigma_a_per_mm = 1\n"
                "sigma_s_per_mm = 1\nreduced_sigma_s_per_mm = 1\n",
                "p.toml:7: medium[0].reduced_sigma_s_per_mm: given beside"},
-           Bad{layered + "[[layer]]\nmedium = \"marble\"\n",
-               "missing layer[0].thickness_mm"},
-           Bad{layered + "[[layer]]\nmedium = \"marbel\"\nthickness_mm = 1\n",
-               "p.toml:4: layer[0].medium: 'marbel' is not the name"},
-           Bad{layered + "thickness_mm = 3\n[[layer]]\nmedium = \"marble\"\n"
-                         "thickness_mm = 1\n",
-               "layers are 1 mm thick together, but slab.thickness_mm is 3"},
-           Bad{layered + "thickness_mm = 1\n[[layer]]\nmedium = \"marble\"\n"
-                         "thickness_mm = 1\n[[layer]]\nmedium = \"marble\"\n",
-               "thickness_mm: 0 mm for the layer below 1 mm"},
-           Bad{layered + "[[layer]]\nmedium = \"marble\"\nthickness_mm = inf\n"
-                         "[[layer]]\nmedium = \"marble\"\nthickness_mm = 1\n",
-               "only the last one's may be infinite"},
-           Bad{layered + "[[layer]]\nmedium = \"marble\"\nthickness_mm = 1\n[pattern]\n"
-                         "type = \"stripes\"\ncell_mm = 1\n",
-               "pattern: given for a slab of layers"},
-           Bad{"medium = \"marble\"\n[slab]\nthickness_mm = 5\n[pattern]\n"
-               "type = \"layers\"\n",
-               "p.toml:5: pattern.type: 'layers' given, but there is no [[layer]]"},
-           Bad{"[slab]\nthickness_mm = 0.1\n[skin]\n", "leaves no dermis"},
-           Bad{"[slab]\n[skin]\nmelanin_fraction = 2\n",
-               "p.toml:3: skin.melanin_fraction: 2 is outside"},
-           Bad{"[slab]\n[skin]\nwavelengths_nm = [200, 500, 600]\n",
-               "p.toml:3: skin.wavelengths_nm: 200 is outside"},
-           Bad{"channels = [\"x\"]\n[slab]\n[skin]\n", "skin.wavelengths_nm: missing"},
-           Bad{kTwo + "[pattern]\ntype = \"veins\"\n", "pattern.extent_mm: missing"},
-           Bad{kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [1000, 1000]\n"
-                      "voxel_mm = 0.01\n",
-               "p.toml:8: pattern.voxel_mm: 100000 × 100000 × 500 voxels are more"},
-           Bad{kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [1e6, 1]\n"
-                      "voxel_mm = 1e-4\n",
-               "pattern.voxel_mm: 0.0001 mm make 1e+10 voxels"},
-           Bad{kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [5, 5]\nwarp = -1\n",
+           BadKind{layered + "[[layer]]\nmedium = \"marble\"\n",
+                   "missing layer[0].thickness_mm"},
+           BadKind{layered + "[[layer]]\nmedium = \"marbel\"\nthickness_mm = 1\n",
+                   "p.toml:4: layer[0].medium: 'marbel' is not the name"},
+           BadKind{layered + "thickness_mm = 3\n[[layer]]\nmedium = \"marble\"\n"
+                             "thickness_mm = 1\n",
+                   "layers are 1 mm thick together, but slab.thickness_mm is 3"},
+           BadKind{layered + "thickness_mm = 1\n[[layer]]\nmedium = \"marble\"\n"
+                             "thickness_mm = 1\n[[layer]]\nmedium = \"marble\"\n",
+                   "thickness_mm: 0 mm for the layer below 1 mm"},
+           BadKind{layered + "[[layer]]\nmedium = \"marble\"\nthickness_mm = inf\n"
+                             "[[layer]]\nmedium = \"marble\"\nthickness_mm = 1\n",
+                   "only the last one's may be infinite"},
+           BadKind{layered +
+                       "[[layer]]\nmedium = \"marble\"\nthickness_mm = 1\n[pattern]\n"
+                       "type = \"stripes\"\ncell_mm = 1\n",
+                   "pattern: given for a slab of layers"},
+           BadKind{"medium = \"marble\"\n[slab]\nthickness_mm = 5\n[pattern]\n"
+                   "type = \"layers\"\n",
+                   "p.toml:5: pattern.type: 'layers' given, but there is no [[layer]]"},
+           BadKind{"[slab]\nthickness_mm = 0.1\n[skin]\n", "leaves no dermis"},
+           BadKind{"[slab]\n[skin]\nmelanin_fraction = 2\n",
+                   "p.toml:3: skin.melanin_fraction: 2 is outside"},
+           BadKind{"[slab]\n[skin]\nwavelengths_nm = [200, 500, 600]\n",
+                   "p.toml:3: skin.wavelengths_nm: 200 is outside"},
+           BadKind{"channels = [\"x\"]\n[slab]\n[skin]\n",
+                   "skin.wavelengths_nm: missing"},
+           BadKind{kTwo + "[pattern]\ntype = \"veins\"\n",
+                   "pattern.extent_mm: missing"},
+           BadKind{kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [1000, 1000]\n"
+                          "voxel_mm = 0.01\n",
+                   "p.toml:8: pattern.voxel_mm: 100000 × 100000 × 500 voxels are more"},
+           BadKind{kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [1e6, 1]\n"
+                          "voxel_mm = 1e-4\n",
+                   "pattern.voxel_mm: 0.0001 mm make 1e+10 voxels"},
+           BadKind{
+               kTwo + "[pattern]\ntype = \"veins\"\nextent_mm = [5, 5]\nwarp = -1\n",
                "p.toml:8: pattern.warp: -1 is outside"},
-           Bad{"medium = \"marble\"\n[slab]\nthickness_mm = 5\n[pattern]\n"
-               "type = \"onyx\"\n",
-               "p.toml:5: pattern.type: 1 media given, but the pattern 'onyx'"},
-           Bad{"medium = [\"marble\", \"skin1\"]\n[slab]\nthickness_mm = inf\neta = "
+           BadKind{"medium = \"marble\"\n[slab]\nthickness_mm = 5\n[pattern]\n"
+                   "type = \"onyx\"\n",
+                   "p.toml:5: pattern.type: 1 media given, but the pattern 'onyx'"},
+           BadKind{
+               "medium = [\"marble\", \"skin1\"]\n[slab]\nthickness_mm = inf\neta = "
                "1.5\n"
                "[pattern]\ntype = \"onyx\"\nextent_mm = [5, 5]\n",
                "pattern.depth_mm: missing"},
-           Bad{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n",
-               "pattern.inclusion: missing"},
-           Bad{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n"
-                      "[[pattern.inclusion]]\nmedium = \"gold\"\n",
-               "'gold' is not one of the phantom's media: marble, skin1"},
-           Bad{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n"
-                      "[[pattern.strewn]]\nmedium = \"skin1\"\ncount = 5\n"
-                      "radius_mm = [3, 2]\n",
-               "radius_mm: expected one number, or [smallest, largest]"},
+           BadKind{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n",
+                   "pattern.inclusion: missing"},
+           BadKind{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n"
+                          "[[pattern.inclusion]]\nmedium = \"gold\"\n",
+                   "'gold' is not one of the phantom's media: marble, skin1"},
+           BadKind{kTwo + "[pattern]\ntype = \"inclusions\"\nextent_mm = [5, 5]\n"
+                          "[[pattern.strewn]]\nmedium = \"skin1\"\ncount = 5\n"
+                          "radius_mm = [3, 2]\n",
+                   "radius_mm: expected one number, or [smallest, largest]"},
        }) {
     EXPECT_THAT([&] { ParsePhantom(bad.text, "p.toml"); },
                 ThrowsMessage<Error>(HasSubstr(bad.message)))

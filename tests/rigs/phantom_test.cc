@@ -92,16 +92,16 @@ TEST(Phantom, NamesItsOwnChannels) {
   EXPECT_THAT(phantom.channels, ElementsAre("638nm", "520nm"));
 }
 
-struct Bad {
+struct BadLine {
   const char* from;
   const char* to;
   const char* message;
 };
 
-class BadPhantom : public ::testing::TestWithParam<Bad> {};
+class BadPhantom : public ::testing::TestWithParam<BadLine> {};
 
 TEST_P(BadPhantom, IsRefusedWithFileAndLine) {
-  const Bad& bad = GetParam();
+  const BadLine& bad = GetParam();
   try {
     ParsePhantom(With(bad.from, bad.to), "p.toml");
     FAIL() << bad.message;
@@ -115,39 +115,43 @@ INSTANTIATE_TEST_SUITE_P(
     Phantom,
     BadPhantom,
     ::testing::Values(
-        Bad{"thickness_mm = 10.0",
-            "thickness_mm = -1",
-            "p.toml:2: slab.thickness_mm: -1 is"},
-        Bad{"eta = 1.5", "eta = 0.5", "p.toml:3: slab.eta: 0.5 is outside"},
-        Bad{"eta = 1.5", "", "missing slab.eta"},
-        Bad{"\"air\"",
-            "\"glass\"",
-            "p.toml:4: slab.bottom: 'glass' is not known; known are: air, matched"},
-        Bad{"[0.0021, 0.0041, 0.0071]",
-            "[0.0021, 0.0041]",
-            "p.toml:7: medium[0].sigma_a_per_mm: 2 values for 3 channels"},
-        Bad{"2.19", "-2.19", "p.toml:8: medium[0].sigma_s_per_mm: -2.19 is outside"},
-        Bad{"2.19", "nan", "p.toml:8: medium[0].sigma_s_per_mm: nan is outside"},
-        Bad{"g = 0.8", "g = 1.0", "p.toml:14: medium[1].g: 1 is outside"},
-        Bad{"g = 0.8", "gee = 1.0", "p.toml:14: medium[1].gee: unknown here"},
-        Bad{"\"chessboard\"",
-            "\"go board\"",
-            "p.toml:16: pattern.type: 'go board' is not known"},
-        Bad{"\"chessboard\"\ncell_mm = 1.5",
-            "\"homogeneous\"",
-            "medium: 2 given, but the pattern 'homogeneous' is made of 1"},
-        Bad{"cell_mm = 1.5", "cell_mm = 0", "p.toml:17: pattern.cell_mm: 0 is outside"},
-        Bad{"\"gaussian\"", "\"star\"", "p.toml:19: beam.shape: 'star' is not known"},
-        Bad{"[64, 48]", "[64]", "p.toml:23: grid.points: expected two whole numbers"},
-        Bad{"[64, 48]",
-            "[64, 4.5]",
-            "p.toml:23: grid.points: expected two whole numbers"},
-        Bad{"core = 39", "core = 40", "p.toml:25: grid.core: 40 is even"},
-        Bad{"[slab]", "shannels = 3\n[slab]", "p.toml:1: shannels: unknown here"},
-        Bad{"[slab]",
-            "channels = [\"R\", \"R\", \"B\"]\n[slab]",
-            "p.toml:1: channels: expected different"},
-        Bad{"[slab]", "[slab", "p.toml:1:"}));
+        BadLine{"thickness_mm = 10.0",
+                "thickness_mm = -1",
+                "p.toml:2: slab.thickness_mm: -1 is"},
+        BadLine{"eta = 1.5", "eta = 0.5", "p.toml:3: slab.eta: 0.5 is outside"},
+        BadLine{"eta = 1.5", "", "missing slab.eta"},
+        BadLine{"\"air\"",
+                "\"glass\"",
+                "p.toml:4: slab.bottom: 'glass' is not known; known are: air, matched"},
+        BadLine{"[0.0021, 0.0041, 0.0071]",
+                "[0.0021, 0.0041]",
+                "p.toml:7: medium[0].sigma_a_per_mm: 2 values for 3 channels"},
+        BadLine{
+            "2.19", "-2.19", "p.toml:8: medium[0].sigma_s_per_mm: -2.19 is outside"},
+        BadLine{"2.19", "nan", "p.toml:8: medium[0].sigma_s_per_mm: nan is outside"},
+        BadLine{"g = 0.8", "g = 1.0", "p.toml:14: medium[1].g: 1 is outside"},
+        BadLine{"g = 0.8", "gee = 1.0", "p.toml:14: medium[1].gee: unknown here"},
+        BadLine{"\"chessboard\"",
+                "\"go board\"",
+                "p.toml:16: pattern.type: 'go board' is not known"},
+        BadLine{"\"chessboard\"\ncell_mm = 1.5",
+                "\"homogeneous\"",
+                "medium: 2 given, but the pattern 'homogeneous' is made of 1"},
+        BadLine{
+            "cell_mm = 1.5", "cell_mm = 0", "p.toml:17: pattern.cell_mm: 0 is outside"},
+        BadLine{
+            "\"gaussian\"", "\"star\"", "p.toml:19: beam.shape: 'star' is not known"},
+        BadLine{
+            "[64, 48]", "[64]", "p.toml:23: grid.points: expected two whole numbers"},
+        BadLine{"[64, 48]",
+                "[64, 4.5]",
+                "p.toml:23: grid.points: expected two whole numbers"},
+        BadLine{"core = 39", "core = 40", "p.toml:25: grid.core: 40 is even"},
+        BadLine{"[slab]", "shannels = 3\n[slab]", "p.toml:1: shannels: unknown here"},
+        BadLine{"[slab]",
+                "channels = [\"R\", \"R\", \"B\"]\n[slab]",
+                "p.toml:1: channels: expected different"},
+        BadLine{"[slab]", "[slab", "p.toml:1:"}));
 
 TEST(Phantom, MissingMediaAndFilesAreRefused) {
   EXPECT_THAT([] { ParsePhantom("[slab]\nthickness_mm = 1\neta = 1.3\n", "p.toml"); },

@@ -1,5 +1,6 @@
 #pragma once
 
+#include "core/random.h"
 #include "rigs/phantom.h"
 
 #include <string>
@@ -22,6 +23,12 @@ inline Phantom TwoMarbles(PatternType type, double cell_mm) {
   phantom.media.push_back({"dark", {0.06}, {1.0}, {0.0}});
   phantom.pattern = {.type = type, .cell_mm = cell_mm};
   return phantom;
+}
+
+/// A point of a square of that width about the origin.
+inline PointMm DrawPoint(RandomStream& random, double extent_mm) {
+  const double x = (random.Uniform() - 0.5) * extent_mm;
+  return {x, (random.Uniform() - 0.5) * extent_mm};
 }
 
 }  // namespace nacre::rigs::testing

@@ -160,29 +160,29 @@ TEST_F(SimulatedRigTest, ExposuresAreRoundedAndBounded) {
   EXPECT_THROW(rig.camera().SetExposureUs(1e12), Error);
 }
 
-struct Bad {
+struct BadRig {
   const char* from;
   const char* to;
   const char* message;
 };
 
 TEST_F(SimulatedRigTest, BadFilesAreRefusedWithTheLine) {
-  for (const Bad& bad : {
-           Bad{"seed = 4", "sead = 4", "simulated.sead: unknown here"},
-           Bad{"\"phantom.toml\"", "\"nothing.toml\"", "nothing.toml"},
-           Bad{"field_mm = 36", "", "missing simulated.camera.field_mm"},
-           Bad{"width_px = 120",
-               "width_px = 3",
-               "simulated.camera.width_px: 3 is outside"},
-           Bad{"width_px = 120",
-               "width_px = 120\nshutter = 1",
-               "simulated.camera.shutter: unknown here"},
-           Bad{"[10, 8, 6]",
-               "[10, 8]",
-               "simulated.laser.power_mw: 2 values for 3 channels"},
-           Bad{"mm_per_rad = 400",
-               "mm_per_rad = 400\nchannels = [\"R\", \"G\"]",
-               "has other channels than this rig's scanner"},
+  for (const BadRig& bad : {
+           BadRig{"seed = 4", "sead = 4", "simulated.sead: unknown here"},
+           BadRig{"\"phantom.toml\"", "\"nothing.toml\"", "nothing.toml"},
+           BadRig{"field_mm = 36", "", "missing simulated.camera.field_mm"},
+           BadRig{"width_px = 120",
+                  "width_px = 3",
+                  "simulated.camera.width_px: 3 is outside"},
+           BadRig{"width_px = 120",
+                  "width_px = 120\nshutter = 1",
+                  "simulated.camera.shutter: unknown here"},
+           BadRig{"[10, 8, 6]",
+                  "[10, 8]",
+                  "simulated.laser.power_mw: 2 values for 3 channels"},
+           BadRig{"mm_per_rad = 400",
+                  "mm_per_rad = 400\nchannels = [\"R\", \"G\"]",
+                  "has other channels than this rig's scanner"},
        }) {
     Rewrite(bad.from, bad.to);
     EXPECT_THAT([&] { SimulatedRig{path()}; },

@@ -11,7 +11,7 @@
 namespace nacre::rigs::diffusion {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 double BottomFactor(const Slab& slab, double top_factor) {
   switch (slab.bottom) {
@@ -21,7 +21,7 @@ double BottomFactor(const Slab& slab, double top_factor) {
     case Bottom::kBlack:
       return 1;
     case Bottom::kWhite:
-      return kInfinity;
+      return kUnbounded;
   }
   throw LogicError("a bottom of no kind");
 }
@@ -44,8 +44,8 @@ ChannelSetup MakeChannelSetup(const Phantom& phantom,
   setup.cut = std::isinf(slab.thickness_mm);
   setup.bottom_diffuses = slab.bottom == Bottom::kWhite && !setup.cut;
   setup.bottom_absorbs = slab.bottom == Bottom::kBlack && !setup.cut;
-  setup.shortest_free_path_mm = kInfinity;
-  double slowest = kInfinity;
+  setup.shortest_free_path_mm = kUnbounded;
+  double slowest = kUnbounded;
   double diffusion_mm = 0;
   for (const Medium& medium : PatternMedia(phantom)) {
     ChannelSetup::Substance s;

@@ -14,7 +14,7 @@
 namespace nacre::rigs::monte_carlo {
 namespace {
 
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kForEver = std::numeric_limits<double>::infinity();
 // Past a face by this much, a point is surely in the next cell.
 constexpr double kNudgeMm = 1e-9;
 
@@ -63,7 +63,7 @@ class Photon {
   // Distance to the plane that bounds the layer or box; the axis it is normal to.
   double DistanceToFace(std::size_t& axis) const {
     const double z = direction_[2];
-    double distance = kInfinity;
+    double distance = kForEver;
     if (z < 0) {
       distance = (layer_top_ - position_[2]) / z;
     } else if (z > 0) {
@@ -86,7 +86,7 @@ class Photon {
 
   // Distance to the next lattice plane of pattern or voxels.
   double DistanceToCell() const {
-    Vector cell{kInfinity, kInfinity, kInfinity};
+    Vector cell{kForEver, kForEver, kForEver};
     Vector origin{0, 0, 0};
     if (volume_.voxels) {
       cell = volume_.voxels->size_mm;
@@ -97,7 +97,7 @@ class Photon {
         cell[1] = volume_.pattern.cell_mm;
       }
     }
-    double distance = kInfinity;
+    double distance = kForEver;
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const double u = direction_[axis];
       if (std::isinf(cell[axis]) || u == 0) {
@@ -130,8 +130,8 @@ class Photon {
     const double sigma = woodcock   ? majorant_
                          : implicit ? optics.sigma_s_per_mm
                                     : optics.SigmaT();
-    const double to_collision = sigma > 0 ? Exponential() / sigma : kInfinity;
-    const double to_cell = woodcock ? kInfinity : DistanceToCell();
+    const double to_collision = sigma > 0 ? Exponential() / sigma : kForEver;
+    const double to_cell = woodcock ? kForEver : DistanceToCell();
     const double distance = std::min({to_face, to_collision, to_cell});
     Move(distance);
     if (implicit && !woodcock) {
@@ -316,7 +316,7 @@ class Photon {
     if (method_.capture == Capture::kImplicit) {
       Ending absorbed = ending_;
       absorbed.fate = Fate::kAbsorbed;
-      absorbed.depth_mm = kInfinity;  // spread over the path
+      absorbed.depth_mm = kForEver;  // spread over the path
       // Entered weight plus roulette's gains is either absorbed or left.
       tally.Add(absorbed, 1 + roulette_gain_ - weight_);
     }

@@ -12,12 +12,14 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fmt/format.h>
 #include <regex>
 #include <utility>
 
 namespace nacre::exchange {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::RunJson;
 
@@ -125,6 +127,12 @@ TEST_F(Export, EachStatesUnitResidualAndLoss) {
     EXPECT_THAT(json.at("units").get<std::string>(), HasSubstr("millimetres"));
     EXPECT_LT(json.at("fit").at("mean_residual").get<double>(), 0.02) << target;
     EXPECT_THAT(json.at("lost").get<std::string>(), HasSubstr("profile")) << target;
+    const Json made = RunJson({"inspect", folder_ / target, "--provenance"});
+    EXPECT_THAT(
+        made.at("commands").get<std::vector<std::string>>(),
+        ElementsAre(
+            HasSubstr("needs stone.rd.exr (xxh3 "),
+            fmt::format("nacre export stone.rd.exr --to {} --out {}", target, target)));
   }
 }
 

@@ -142,6 +142,12 @@ TEST_F(PresetTest, ErrorsNameTheLine) {
   EXPECT_THAT(Without("\"stone\"", "\"a/b\""), HasSubstr("can't be called 'a/b'"));
   EXPECT_THAT(Without("\"albedo.exr\"", "\"../albedo.exr\""),
               HasSubstr("in the preset's own folder"));
+  const std::filesystem::path albedo = Folder() / "albedo.exr";
+  std::filesystem::rename(albedo, folder_ / "elsewhere.exr");
+  std::filesystem::create_symlink(folder_ / "elsewhere.exr", albedo);
+  EXPECT_THAT(ErrorMessage([&] { ReadPreset(Folder()); }),
+              HasSubstr("elsewhere.exr, outside of the preset's folder"));
+  std::filesystem::rename(folder_ / "elsewhere.exr", albedo);
   EXPECT_THAT(Without("size_mm = [2, 2]", "size_mm = [2]"),
               HasSubstr("width and height"));
   EXPECT_THAT(Without("size_mm = [2, 2]", "size_mm = [2, nan]"), HasSubstr("size_mm"));

@@ -17,8 +17,8 @@ namespace nacre::render {
 namespace {
 
 using std::numbers::pi;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 constexpr DipoleParameters kMarble{
     {0.0021F, 0.0041F, 0.0071F}, {2.19F, 2.62F, 3.00F}, 1.5F};

@@ -15,8 +15,8 @@ namespace nacre::render {
 namespace {
 
 using std::numbers::pi;
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 /// The fit to F_dr that the published values were made with [Egan73, Jensen01].
 double PolynomialReflectance(double eta) {

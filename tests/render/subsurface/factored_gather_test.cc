@@ -17,8 +17,8 @@
 namespace nacre::render {
 namespace {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 constexpr DipoleParameters kMedium{{0.0071F, 0.02F, 0.05F}, {3.0F, 2.0F, 1.0F}, 1.5F};
 
@@ -65,7 +65,7 @@ Color EdgeLight(Vec3 p) {
   return p.x + 0.3F * p.y < 0.37F ? Color{1, 1, 1} : Color{0, 0, 0};
 }
 
-class LikeTheDipole : public testing::TestWithParam<MaterialShape> {};
+class LikeTheDipole : public ::testing::TestWithParam<MaterialShape> {};
 
 TEST_P(LikeTheDipole, OnAPlane) {
   const auto factored = MakeFactored(DipoleMaterial(Profiles(), GetParam()));
@@ -111,9 +111,9 @@ TEST_P(LikeTheDipole, OnASphere) {
 
 INSTANTIATE_TEST_SUITE_P(Pitches,
                          LikeTheDipole,
-                         testing::Values(MaterialShape{4, 79, 0.25},
-                                         MaterialShape{4, 39, 1.0},
-                                         MaterialShape{4, 31, 1.25}));
+                         ::testing::Values(MaterialShape{4, 79, 0.25},
+                                           MaterialShape{4, 39, 1.0},
+                                           MaterialShape{4, 31, 1.25}));
 
 TEST(FactoredGather, UniformLightOnAPlaneGivesTheAlbedo) {
   const MaterialShape shape{4, 15, 1.0};

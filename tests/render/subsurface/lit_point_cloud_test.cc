@@ -14,8 +14,8 @@
 namespace nacre::render {
 namespace {
 
-using testing::HasSubstr;
-using testing::ThrowsMessage;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
 
 double TotalFlux(const std::vector<Patch>& patches, int c) {
   double sum = 0;

@@ -2,6 +2,7 @@
 #include "rigs/transport/analytic/better_dipole.h"
 #include "rigs/transport/analytic/diffusion_laws.h"
 #include "rigs/transport/analytic/photon_beam_diffusion.h"
+#include "tests/rigs/transport/analytic/over_plane.h"
 #include "tests/rigs/transport/analytic/reference_values.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +10,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 
 namespace nacre::rigs {
 namespace {
@@ -17,24 +17,10 @@ namespace {
 using reference::kMaterials;
 using reference::kMoments;
 using reference::kRadiiMm;
+using testing::OverPlane;
 
 DiffusionMedium MediumOf(const reference::Material& m) {
   return {m.sigma_a, m.sigma_s_prime};
-}
-
-// ∫ f(r) 2πr dr on a geometric grid of Simpson panels.
-template <class Function>
-double OverPlane(Function&& f) {
-  constexpr int kPanels = 400;
-  const double low = std::log(1e-5);
-  const double step = (std::log(400.0) - low) / kPanels;
-  double sum = 0;
-  for (int i = 0; i <= 2 * kPanels; ++i) {
-    const double r = std::exp(low + 0.5 * step * i);
-    const double weight = i == 0 || i == 2 * kPanels ? 1 : (i % 2 == 1 ? 4 : 2);
-    sum += weight * f(r) * 2 * std::numbers::pi * r * r;
-  }
-  return sum * step / 6;
 }
 
 TEST(DiffusionLaws, MomentsMatchQuadratureTable) {

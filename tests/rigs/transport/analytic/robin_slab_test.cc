@@ -1,13 +1,16 @@
 #include "rigs/transport/analytic/robin_slab.h"
 
+#include "tests/rigs/transport/analytic/over_plane.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 namespace nacre::rigs {
 namespace {
+
+using testing::OverPlane;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -17,20 +20,6 @@ RobinSlabSetup SlabOf(DiffusionMedium medium, double thickness_mm, double eta) {
           .thickness_mm = thickness_mm,
           .top_factor = BoundaryFactor(BoundaryLaw::kExact, eta),
           .bottom_factor = BoundaryFactor(BoundaryLaw::kExact, eta)};
-}
-
-template <class Function>
-double OverPlane(Function&& f) {
-  constexpr int kPanels = 300;
-  const double low = std::log(1e-4);
-  const double step = (std::log(300.0) - low) / kPanels;
-  double sum = 0;
-  for (int i = 0; i <= 2 * kPanels; ++i) {
-    const double r = std::exp(low + 0.5 * step * i);
-    const double weight = i == 0 || i == 2 * kPanels ? 1 : (i % 2 == 1 ? 4 : 2);
-    sum += weight * f(r) * 2 * std::numbers::pi * r * r;
-  }
-  return sum * step / 6;
 }
 
 const DiffusionMedium kMarble{0.0021, 2.19};
