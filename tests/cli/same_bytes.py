@@ -43,7 +43,8 @@ CPU = {
 }
 
 # What the whole command runs on: without AVX, and with AVX2 and FMA but no AVX-512.
-PROCESSORS = ["Nehalem", "Haswell"]
+# OpenBLAS takes the first for one with AVX.
+PROCESSORS = {"Nehalem": {"OPENBLAS_CORETYPE": "Prescott"}, "Haswell": {}}
 
 
 def commands(line):
@@ -149,11 +150,12 @@ def chosen_ways(arguments, nacre, folder):
     """{column: (threads, environment, command or None)}"""
     ways = {} if arguments.no_threads else {name: (*way, None) for name, way in THREADS.items()}
     if arguments.quick:
-        del ways["2 threads"]
+        ways.pop("2 threads", None)
     if arguments.cpu:
         ways.update({name: (*way, None) for name, way in CPU.items()})
     if arguments.processors:
-        ways.update({name: (1, {}, emulated(nacre, name, folder)) for name in PROCESSORS})
+        for name, environment in PROCESSORS.items():
+            ways[name] = (1, environment, emulated(nacre, name, folder))
     for other in arguments.other:
         ways[Path(other).resolve().parent.name] = (1, {}, os.path.abspath(other))
     return ways

@@ -283,7 +283,7 @@ TEST(ReconstructOracles, TailsDoNotDependOnTheUnit) {
   EXPECT_GT(seen, 500);
 }
 
-// What no tail can be fitted to has none, and never anything that isn't finite.
+// What no tail can be fitted to has none, and never what is no number.
 TEST(ReconstructOracles, WhatIsNotATailIsNone) {
   RdHeader header = TailHeader();
   RdSlice dark = MakeSlice(header);
