@@ -89,7 +89,7 @@ def run(line, arguments, outputs, folder, threads, environment, nacre=None):
     if embree:  # Embree looks for its settings in the home folder
         (copy / ".embree3").write_text(embree + "\n")
         environment["HOME"] = str(copy)
-    result = line.run(arguments, copy, environment, threads=threads, nacre=nacre)
+    result = line.run(arguments, copy, environment, threads=threads, nacre=nacre, timeout=1800)
     if result.returncode != 0:
         raise SystemExit(f"{' '.join(arguments)}: exit code {result.returncode}: {result.stderr}")
     files = content(copy, outputs)
