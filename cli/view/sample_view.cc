@@ -124,7 +124,8 @@ Answer LightOf(const Shown& shown, const Query& query) {
   const auto exitance = LightDisc(*shown.sample, x, y, radius);
   return Png(report::ColorImage(
       Planes(h, exitance),
-      std::exp2(stops) / std::max(1e-9, double{shown.sample->LargestAlbedo()})));
+      std::exp2(stops) /
+          std::max(1e-9, static_cast<double>(shown.sample->LargestAlbedo()))));
 }
 
 Answer MapOf(const factor::Material& m, const Query& query) {
@@ -186,7 +187,7 @@ std::map<std::string, web::Handler> SampleView(const std::filesystem::path& path
       {"albedo.png", [s](const Query&) {
          return Png(report::ColorImage(
              Planes(s->sample->header(), s->sample->albedo()),
-             1 / std::max(1e-9, double{s->sample->LargestAlbedo()})));
+             1 / std::max(1e-9, static_cast<double>(s->sample->LargestAlbedo()))));
        }}};
   if (s->sample->material() != nullptr) {
     routes["map.png"] = [s](const Query& query) {

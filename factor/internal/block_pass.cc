@@ -161,18 +161,17 @@ RankShare PassShare(std::int64_t points, const Ranks* ranks) {
 }
 
 std::vector<BlockProduct> RunBlockPass(SliceSource& source,
-                                       const FillRowFunction& fill,
-                                       const std::vector<std::size_t>& channels,
-                                       const std::vector<Eigen::MatrixXd>& bases,
+                                       const PassMatrices& y,
                                        const Workers& workers,
                                        const ProgressFunction& progress,
                                        const std::string& note) {
   const std::int64_t points = source.header().PointCount();
   std::vector<ChannelPass> passes;
-  for (const Eigen::MatrixXd& basis : bases) {
+  passes.reserve(y.bases.size());
+  for (const Eigen::MatrixXd& basis : y.bases) {
     passes.emplace_back(basis, points);
   }
-  const auto matrices = static_cast<std::int64_t>(channels.size());
+  const auto matrices = static_cast<std::int64_t>(y.channels.size());
   const auto add_chunk = [&](std::int64_t first, std::int64_t end) {
     const SliceBlock block = source.Read(first, std::min(kChunk, end - first));
     const std::int64_t parts = (block.count + kRows - 1) / kRows;
@@ -181,8 +180,8 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
       const std::int64_t start = task % parts * kRows;
       passes[matrix].Add(first + start,
                          std::min(kRows, block.count - start),
-                         [&](std::int64_t row, float* y) {
-                           return fill(block, start + row, channels[matrix], y);
+                         [&](std::int64_t row, float* to) {
+                           return y.fill(block, start + row, y.channels[matrix], to);
                          });
     });
   };
@@ -203,6 +202,7 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
   const std::vector<double> total = sum.Finish();
   std::span<const double> left = total;
   std::vector<BlockProduct> products;
+  products.reserve(passes.size());
   for (ChannelPass& pass : passes) {
     products.push_back(pass.Finish(left));
   }

@@ -39,14 +39,19 @@ void JoinPassRows(std::int64_t points, const Ranks* ranks, std::span<T> plane) {
   });
 }
 
-/// One pass for the matrices of `channels`, with a basis each (all of a whole number of
-/// panels). Y is a channel's rows as `fill` makes them. Products are in floats, their
+/// The matrices of a pass: Y is a channel's rows as `fill` makes them; a basis each,
+/// all of a whole number of panels.
+struct PassMatrices {
+  const FillRowFunction& fill;
+  const std::vector<std::size_t>& channels;
+  const std::vector<Eigen::MatrixXd>& bases;
+};
+
+/// One pass over the rows of all matrices. Products are in floats, their
 /// sums over blocks of rows in double. Rows always go to the same sums in the same
 /// order, so the bits don't depend on the number of threads and ranks.
 std::vector<BlockProduct> RunBlockPass(SliceSource& source,
-                                       const FillRowFunction& fill,
-                                       const std::vector<std::size_t>& channels,
-                                       const std::vector<Eigen::MatrixXd>& bases,
+                                       const PassMatrices& y,
                                        const Workers& workers,
                                        const ProgressFunction& progress,
                                        const std::string& note);

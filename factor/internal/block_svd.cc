@@ -176,7 +176,7 @@ void BlockSvdSolver::SolveSample(SliceSource& sample,
   const Eigen::Index size = bases_.front().cols();
   for (int pass = 0; pass < kMostSamplePasses; ++pass) {
     const std::vector<BlockProduct> products = RunBlockPass(
-        sample, fill_, channels_, bases_, options_.workers, progress, "sample");
+        sample, {fill_, channels_, bases_}, options_.workers, progress, "sample");
     double excess = 0;
     bool is_cut = false;
     for (std::size_t n = 0; n < products.size(); ++n) {
@@ -200,7 +200,7 @@ BlockSvds BlockSvdSolver::Solve(SliceSource& sample,
   const Eigen::Index size = bases_.front().cols();
   while (true) {
     const std::vector<BlockProduct> products = RunBlockPass(
-        source, fill_, channels_, bases_, options_.workers, progress, "products");
+        source, {fill_, channels_, bases_}, options_.workers, progress, "products");
     ++result.passes;
     result.svds.clear();
     double excess = 0;

@@ -177,7 +177,7 @@ TEST(AravisCameraTest, ThePicturesNumberGoesToTheCamera) {
   AravisCamera camera(OptionsOf(twin));
   camera.SetExposureUs(20);
   Take(camera);
-  for (const std::uint64_t number : {7, 8, 600}) {
+  for (const std::uint64_t number : {7U, 8U, 600U}) {
     const auto frame = camera.Capture(number, kTimeout);
     ASSERT_TRUE(frame);
     EXPECT_EQ(frame->counts.front(), 100 * number + 20);

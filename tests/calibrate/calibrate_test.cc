@@ -42,7 +42,7 @@ class CalibrateSynthetic : public ::testing::Test {
 
   static TempFolder* folder_;
   static Calibration* calibration_;
-  const SyntheticTruth truth_;
+  const SyntheticTruth truth_ = {};
 };
 
 TempFolder* CalibrateSynthetic::folder_ = nullptr;

@@ -8,6 +8,9 @@
 #include "tests/cli/command.h"
 #include "tests/support/temp_folder.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include <chrono>
 #include <csignal>
 #include <fcntl.h>

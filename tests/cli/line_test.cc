@@ -5,6 +5,8 @@
 #include "tests/cli/command.h"
 #include "tests/support/temp_folder.h"
 
+#include <gtest/gtest.h>
+
 #include <filesystem>
 
 namespace nacre {

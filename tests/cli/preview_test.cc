@@ -7,6 +7,9 @@
 #include "tests/acquire/fake_rig.h"
 #include "tests/support/temp_folder.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include <cstdio>
 #include <fmt/format.h>
 #include <httplib.h>

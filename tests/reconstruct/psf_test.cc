@@ -136,7 +136,7 @@ TEST(Psf, SizesAreCheckedAgainstTheFileBeforeMemoryIsTaken) {
   EXPECT_THAT(ImportError(folder, with(2, 5)), HasSubstr("kw x kh = 5 x 3"));
   EXPECT_THAT(ImportError(folder, with(0, kMax)), HasSubstr("truncated"));
   std::string huge = good;
-  for (const std::size_t word : {0, 1, 2, 3}) {
+  for (const std::size_t word : {0U, 1U, 2U, 3U}) {
     std::memcpy(&huge[4 * word], &kMax, 4);
   }
   EXPECT_THAT(ImportError(folder, huge), HasSubstr("found 448"));

@@ -2,6 +2,8 @@
 // in closed form.
 #include "tests/render/scene_text.h"
 
+#include <gtest/gtest.h>
+
 #include <numbers>
 
 namespace nacre::render::testing {

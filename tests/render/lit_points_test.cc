@@ -5,6 +5,8 @@
 #include "render/exitance_field.h"
 #include "tests/render/scene_text.h"
 
+#include <gtest/gtest.h>
+
 namespace nacre::render::testing {
 namespace {
 

@@ -7,6 +7,8 @@
 #include "tests/render/mesh_subdivision.h"
 #include "tests/render/scene_text.h"
 
+#include <gtest/gtest.h>
+
 namespace nacre::render::testing {
 namespace {
 

@@ -9,6 +9,9 @@
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
 
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
 #include <httplib.h>
 #include <span>
 
