@@ -65,7 +65,7 @@ Ritz RayleighRitz(const BlockProduct& product,
   const Eigen::MatrixXd transposed = product.z * orthonormal;
   const Eigen::HouseholderQR<Eigen::MatrixXd> qr(transposed);
   const Eigen::MatrixXd r = qr.matrixQR().topRows(rank).triangularView<Eigen::Upper>();
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(
+  const Eigen::JacobiSVD<Eigen::MatrixXd, Eigen::NoQRPreconditioner> svd(
       r, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const auto above =
       (svd.singularValues().array() > kRankTolerance * svd.singularValues()(0));

@@ -1,7 +1,6 @@
 #include "factor/internal/tucker_als.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/SVD>
 
 #include <algorithm>
 
@@ -11,16 +10,17 @@ namespace {
 constexpr int kMostRounds = 200;
 constexpr double kEnough = 1e-9;  // of the energy, a round
 
-// The nearest kernel of that rank, of norm 1; zero if there is none.
+constexpr double kRankResidual = 1e-12;  // of a window's right singular vectors
+
+// The nearest kernel W of that rank, of norm 1; zero if there is none: W V Vᵀ, where V
+// are the leading eigenvectors of WᵀW [Eckart36].
 Eigen::VectorXd CutRank(const Eigen::VectorXd& kernel, int core, int rank) {
   Eigen::VectorXd cut = kernel;
   if (rank < core) {
     const Eigen::Map<const RowMatrix> window(kernel.data(), core, core);
-    const Eigen::BDCSVD<Eigen::MatrixXd> svd(window,
-                                             Eigen::ComputeThinU | Eigen::ComputeThinV);
-    Eigen::Map<RowMatrix>(cut.data(), core, core) =
-        svd.matrixU().leftCols(rank) * svd.singularValues().head(rank).asDiagonal() *
-        svd.matrixV().leftCols(rank).transpose();
+    const Eigen::MatrixXd v =
+        ComputeLeadingEigen(window.transpose() * window, rank, kRankResidual).vectors;
+    Eigen::Map<RowMatrix>(cut.data(), core, core) = window * v * v.transpose();
   }
   const double norm = cut.norm();
   if (norm > 0) {
