@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <list>
 #include <mpi.h>
 #include <thread>
@@ -124,6 +125,12 @@ std::unique_ptr<Ranks> JoinRanks() {
   if (!FindLauncher()) {
     return std::make_unique<Ranks>();
   }
+  // Open MPI reads large messages straight out of the other process' memory, and aborts
+  // where that process has died in between; through shared memory the rest goes on.
+  constexpr int kKeepWhatIsSet = 0;
+  setenv("OMPI_MCA_btl_vader_single_copy_mechanism",
+         "none",
+         kKeepWhatIsSet);  // NOLINT(concurrency-mt-unsafe)
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided);
   if (provided < MPI_THREAD_FUNNELED) {

@@ -2,10 +2,11 @@
 
 #include "core/error.h"
 #include "reconstruct/error_figures.h"
+#include "tests/factor/exact_svd.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -76,11 +77,7 @@ TEST(Factor, IsTheTruncatedSvdOfTheTransformedRows) {
           }
         }
       }
-      const Eigen::JacobiSVD<Eigen::MatrixXd> svd(
-          y, Eigen::ComputeThinU | Eigen::ComputeThinV);
-      const Eigen::MatrixXd oracle = svd.matrixU().leftCols(5) *
-                                     svd.singularValues().head(5).asDiagonal() *
-                                     svd.matrixV().leftCols(5).transpose();
+      const Eigen::MatrixXd oracle = nacre::testing::ComputeExactSvd(y).OfRank(5);
       EXPECT_LT((model - oracle).norm() / oracle.norm(), 1e-6) << method << c;
       // Terms come in order: maps of unit mean square, kernels with falling norm.
       for (int t = 0; t < 5; ++t) {

@@ -3,10 +3,11 @@
 #include "core/error.h"
 #include "factor/factor.h"
 #include "factor/internal/mean_slice.h"
+#include "tests/factor/exact_svd.h"
 #include "tests/factor/synthetic.h"
 #include "tests/support/temp_folder.h"
 
-#include <Eigen/SVD>
+#include <Eigen/Core>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -53,11 +54,7 @@ TEST(Falloff, IsTheTruncatedSvdOfDividedRows) {
       y(p, d) = static_cast<double>(dataset.Window(p, 0)[cell]) / g[cell];
     }
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(
-      y, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const Eigen::MatrixXd oracle = svd.matrixU().leftCols(4) *
-                                 svd.singularValues().head(4).asDiagonal() *
-                                 svd.matrixV().leftCols(4).transpose();
+  const Eigen::MatrixXd oracle = nacre::testing::ComputeExactSvd(y).OfRank(4);
   const nacre::testing::TempFolder folder;
   WriteMaterial(folder / "m.nacre.exr", Factor(dataset, Divided("svd", 4)).material);
   const Material m = ReadMaterial(folder / "m.nacre.exr");

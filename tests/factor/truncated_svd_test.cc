@@ -2,32 +2,27 @@
 
 #include "core/random.h"
 #include "factor/internal/transform_search.h"
+#include "tests/factor/exact_svd.h"
 
-#include <Eigen/SVD>
 #include <gtest/gtest.h>
 
 namespace nacre::factor::internal {
 namespace {
+
+using nacre::testing::ComputeExactSvd;
+using nacre::testing::ExactSvd;
 
 // Random matrix with singular values that fall geometrically.
 RowMatrix Decaying(int rows, int columns, double ratio, std::uint64_t seed) {
   RandomStream random(seed, 0);
   const auto draw = [&] { return random.Uniform() - 0.5; };
   const Eigen::MatrixXd a = Eigen::MatrixXd::NullaryExpr(rows, columns, draw);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(
-      a, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  Eigen::VectorXd sigma(svd.singularValues().size());
+  const ExactSvd svd = ComputeExactSvd(a);
+  Eigen::VectorXd sigma(svd.sigma.size());
   for (Eigen::Index j = 0; j < sigma.size(); ++j) {
     sigma(j) = 3 * std::pow(ratio, static_cast<double>(j));
   }
-  return svd.matrixU() * sigma.asDiagonal() * svd.matrixV().transpose();
-}
-
-Eigen::MatrixXd Truncated(const RowMatrix& y, int terms) {
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(
-      y, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  return svd.matrixU().leftCols(terms) * svd.singularValues().head(terms).asDiagonal() *
-         svd.matrixV().leftCols(terms).transpose();
+  return svd.u * sigma.asDiagonal() * svd.v.transpose();
 }
 
 // The thesis' way: the leading term of the residual is found by power iteration, taken
@@ -57,7 +52,7 @@ TEST_P(TruncatedSvdShapes, EqualsJacobi) {
   const TruncatedSvd svd = ComputeTruncatedSvd(y, terms);
   ASSERT_EQ(svd.sigma.size(), terms);
   const Eigen::MatrixXd model = svd.scores * svd.basis.transpose();
-  const Eigen::MatrixXd oracle = Truncated(y, terms);
+  const Eigen::MatrixXd oracle = ComputeExactSvd(y).OfRank(terms);
   EXPECT_LT((model - oracle).norm() / oracle.norm(), 1e-9);
   for (int j = 0; j < terms; ++j) {
     EXPECT_NEAR(svd.sigma(j), 3 * std::pow(0.7, j), 1e-7);
@@ -88,7 +83,7 @@ TEST(TruncatedSvd, OneTermAtATimeIsTheSame) {
 TEST(TruncatedSvd, RankBelowTermsGivesFewerTerms) {
   for (const int side : {20, 120}) {
     const RowMatrix y = Decaying(side, side, 0.5, 7);
-    const RowMatrix rank_three = Truncated(y, 3);
+    const RowMatrix rank_three = ComputeExactSvd(y).OfRank(3);
     const TruncatedSvd svd = ComputeTruncatedSvd(rank_three, 10);
     EXPECT_EQ(svd.sigma.size(), 3) << side;
     EXPECT_LT((svd.scores * svd.basis.transpose() - rank_three).norm(), 1e-10);
@@ -106,8 +101,7 @@ TEST(TruncatedSvd, ZerosHaveNoTerms) {
 // over σ, for each term.
 void ExpectBestOfItsRank(const RowMatrix& y, int terms) {
   const TruncatedSvd svd = ComputeTruncatedSvd(y, terms);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> exact(y);
-  const Eigen::VectorXd& sigma = exact.singularValues();
+  const Eigen::VectorXd sigma = ComputeExactSvd(y).sigma;
   const double squares = y.squaredNorm();
   const double epsilon = static_cast<double>(y.rows() + y.cols()) * 0x1p-53 + 1e-13;
   double best = sigma.tail(sigma.size() - terms).squaredNorm();

@@ -77,11 +77,11 @@ class ReconstructStressTest : public StripedSession {
 TEST_F(ReconstructStressTest, PicturesWithoutLightAreZeroWithinTheirNoise) {
   const auto dark =
       static_cast<std::uint16_t>(std::lround(shared->calibration.dark.Counts(0)));
-  for (const bool symmetrize : {false, true}) {
+  for (const bool is_reciprocal : {false, true}) {
     const auto [summary, dataset] =
         Of("dark",
            [&](acquire::Frame& frame) { FillWith(dark, frame); },
-           {.symmetrize = symmetrize});
+           {.symmetrize = is_reciprocal});
     EXPECT_EQ(summary.saturated_count, 0);
     for (std::size_t k = 0; k < dataset.rd.size(); ++k) {
       // Rounded to whole counts, and the dark current left out: within four sigma.
