@@ -31,7 +31,7 @@ Nonnegative Multiplicative(const RowMatrix& y, int terms, int rounds) {
   return model;
 }
 
-double Error(const RowMatrix& y, const Nonnegative& model) {
+double ModelError(const RowMatrix& y, const Nonnegative& model) {
   return (y - model.f * model.h).norm() / y.norm();
 }
 
@@ -51,8 +51,8 @@ TEST(Hals, NothingIsNegativeAndNoSweepMakesItWorse) {
 
 TEST(Hals, AsGoodAsManyMultiplicativeUpdates) {
   const RowMatrix y = Random(60, 8, 3) * Random(8, 50, 4) + 0.02 * Random(60, 50, 5);
-  const double ours = Error(y, FactorNonnegative(y, {}, 6, 100, 1));
-  EXPECT_LT(ours, 1.03 * Error(y, Multiplicative(y, 6, 2000)));
+  const double ours = ModelError(y, FactorNonnegative(y, {}, 6, 100, 1));
+  EXPECT_LT(ours, 1.03 * ModelError(y, Multiplicative(y, 6, 2000)));
 }
 
 TEST(Hals, DataOfThatFormAreFound) {
@@ -62,7 +62,7 @@ TEST(Hals, DataOfThatFormAreFound) {
     h.row(j).segment(4 * j, 4).setLinSpaced(1, 2 + j);
   }
   const RowMatrix y = Random(50, 3, 6) * h;
-  EXPECT_LT(Error(y, FactorNonnegative(y, {}, 3, 500, 1)), 1e-4);
+  EXPECT_LT(ModelError(y, FactorNonnegative(y, {}, 3, 500, 1)), 1e-4);
 }
 
 TEST(Hals, NegativeAndZeroRowsAreLeftAtZero) {
