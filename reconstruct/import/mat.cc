@@ -3,6 +3,7 @@
 #include "core/error.h"
 #include "reconstruct/internal/mat_elements.h"
 
+#include <H5Epublic.h>
 #include <bit>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -79,8 +80,20 @@ void CheckWhole(const std::filesystem::path& path) {
   }
 }
 
+// HDF5, which matio reads version 7.3 by, prints its stack of calls for every damaged
+// file, and at the end of the program what such a file left behind. The errors are ours
+// to tell.
+void SilenceHdf5() {
+  static const bool is_silent = [] {
+    constexpr hid_t kDefaultStack = 0;
+    return H5dont_atexit() >= 0 && H5Eset_auto2(kDefaultStack, nullptr, nullptr) >= 0;
+  }();
+  Expect(is_silent, "an HDF5 library that can be silenced");
+}
+
 File Open(const std::filesystem::path& path) {
   CheckWhole(path);
+  SilenceHdf5();
   File file(Mat_Open(path.c_str(), MAT_ACC_RDONLY), Mat_Close);
   if (file == nullptr) {
     throw BadData(path.string() + ": isn't a readable MATLAB file (.mat)");

@@ -322,6 +322,24 @@ TEST(Mat, WhatLiesBesideTheScanMayBeOfAnyKindButMustFit) {
   EXPECT_EQ(changed, 2U);
 }
 
+// HDF5 would print its stack of calls beside our line.
+TEST(Mat, DamagedFilesOfVersion73AreRefusedInOneLine) {
+  const TempFolder folder;
+  WriteMat(folder / "good.mat", MAT_FT_MAT73, false, 1);
+  const std::string good = ReadFile(folder / "good.mat");
+  ::testing::internal::CaptureStderr();
+  for (std::size_t byte = 512; byte < good.size(); byte += 41) {
+    std::string bad = good;
+    bad[byte] = static_cast<char>(bad[byte] ^ 0x5A);
+    WriteFile(folder / "a.mat", bad);
+    try {
+      ImportMat(folder / "a.mat", folder / "a.rd.exr", {.pitch_mm = 1}, {});
+    } catch (const Error&) {
+    }
+  }
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
 TEST(Mat, TruncatedAndHostileFilesAreRefused) {
   const TempFolder folder;
   for (const bool packed : {false, true}) {
