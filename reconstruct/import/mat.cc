@@ -3,11 +3,11 @@
 #include "core/error.h"
 #include "reconstruct/internal/mat_elements.h"
 
-#include <H5Epublic.h>
 #include <bit>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <fstream>
+#include <hdf5.h>
 #include <matio.h>
 #include <memory>
 #include <optional>
@@ -134,6 +134,28 @@ std::string FindVariable(const std::filesystem::path& path, const std::string& w
   return fitting[0];
 }
 
+// HDF5 takes memory for what an element is said to be: 4 GB in a damaged file.
+void CheckElementBytes(const std::filesystem::path& path, const std::string& name) {
+  if (H5Fis_hdf5(path.c_str()) <= 0) {
+    return;  // version 5
+  }
+  using Id = std::unique_ptr<hid_t, void (*)(hid_t*)>;
+  const auto keep = [](hid_t& id) {
+    return Id(id >= 0 ? &id : nullptr, [](hid_t* of) { H5Idec_ref(*of); });
+  };
+  hid_t file_id = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  const Id file = keep(file_id);
+  hid_t set_id = file ? H5Dopen2(file_id, ("/" + name).c_str(), H5P_DEFAULT) : -1;
+  const Id set = keep(set_id);
+  hid_t type_id = set ? H5Dget_type(set_id) : -1;
+  const Id type = keep(type_id);
+  const std::size_t bytes = type ? H5Tget_size(type_id) : 0;
+  if (bytes == 0 || bytes > sizeof(double)) {
+    throw BadData(fmt::format(
+        "{}: variable '{}' has elements of {} bytes", path.string(), name, bytes));
+  }
+}
+
 }  // namespace
 
 ImportSummary ImportMat(const std::filesystem::path& from,
@@ -176,6 +198,7 @@ ImportSummary ImportMat(const std::filesystem::path& from,
                     kMaxPacking * file_bytes,
                     max_bytes));
   }
+  CheckElementBytes(from, name);
   if (Mat_VarReadDataAll(file.get(), variable.get()) != 0 ||
       variable->data == nullptr || static_cast<double>(variable->nbytes) != bytes) {
     throw BadData(fmt::format(
