@@ -35,7 +35,9 @@ bool TakePass(std::string_view& bytes, std::vector<int>& pass) {
     return false;
   }
   pass.resize(count);
-  std::memcpy(pass.data(), bytes.data(), count * sizeof(int));
+  if (count > 0) {  // memcpy doesn't take the null of an empty vector
+    std::memcpy(pass.data(), bytes.data(), count * sizeof(int));
+  }
   bytes.remove_prefix(count * sizeof(int));
   return true;
 }
