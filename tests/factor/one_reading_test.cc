@@ -219,7 +219,7 @@ RdDataset WithOne(float value, std::uint8_t valid) {
 }
 
 TEST(OneReading, WhatIsMissingIsFoundAndFilled) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FactorOptions options = Options("log-svd");
     options.seed = seed;
     const auto [m, summary] = Factor(WithOne(1000, 0), options);
@@ -231,7 +231,7 @@ TEST(OneReading, WhatIsMissingIsFoundAndFilled) {
 }
 
 TEST(OneReading, ANegativeDepthThatNoSampleHasIsSeen) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FactorOptions options = Options("log-svd");
     options.seed = seed;
     const auto [m, summary] = Factor(WithOne(-100, 1), options);
@@ -241,7 +241,7 @@ TEST(OneReading, ANegativeDepthThatNoSampleHasIsSeen) {
 }
 
 TEST(OneReading, NotANumberIsNamed) {
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
     FactorOptions options = Options("svd");
     options.seed = seed;
     try {

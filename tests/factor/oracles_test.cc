@@ -65,7 +65,7 @@ void OnEachTarget(Check&& check) {
 
 TEST(FactorOracles, RowStreamsAreThePlainLoopsToTheBit) {
   constexpr std::size_t kCount = 5;
-  for (const std::size_t n : {1, 3, 15, 16, 17, 63, 64, 65, 130, 1001}) {
+  for (const std::size_t n : {1U, 3U, 15U, 16U, 17U, 63U, 64U, 65U, 130U, 1001U}) {
     std::vector<std::vector<float>> draws;
     std::vector<const float*> rows;
     for (std::size_t q = 0; q < kCount; ++q) {
@@ -368,7 +368,7 @@ TEST(FactorOracles, ReciprocalTotalsAreThoseOfLongDouble) {
 }
 
 TEST(FactorOracles, ScansAreThoseOfLongDouble) {
-  for (const std::size_t n : {1, 15, 16, 49, 1003}) {
+  for (const std::size_t n : {1U, 15U, 16U, 49U, 1003U}) {
     std::vector<float> rd = DrawDecades(n, n);
     RowScans scans(1, 1);
     scans.Add(0, 0, rd);

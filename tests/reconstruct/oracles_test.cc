@@ -266,7 +266,7 @@ TEST(ReconstructOracles, TailsDoNotDependOnTheUnit) {
   int seen = 0;
   for (int du = -12; du <= 12; ++du) {
     for (int dv = -12; dv <= 12; ++dv) {
-      const Wide r = 0.5L * std::hypot(du, dv);
+      const Wide r = 0.5L * std::hypot(static_cast<Wide>(du), static_cast<Wide>(dv));
       const Wide one = W(tails[0].Extrapolate(3, 1, 0, du, dv));
       for (std::size_t n = 1; n < scales.size(); ++n) {
         const Wide scaled =
