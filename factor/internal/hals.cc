@@ -70,7 +70,9 @@ Nonnegative FactorNonnegative(const RowMatrix& y,
       more > 0 ? SpreadRows(y, more, seed) : std::vector<Eigen::Index>{};
   Nonnegative model;
   model.h.resize(given + std::ssize(rows), y.cols());
-  model.h.topRows(given) = start.topRows(given).cwiseMax(0);
+  if (given > 0) {  // an empty start has no columns
+    model.h.topRows(given) = start.topRows(given).cwiseMax(0);
+  }
   for (std::size_t j = 0; j < rows.size(); ++j) {
     model.h.row(given + static_cast<Eigen::Index>(j)) = y.row(rows[j]).cwiseMax(0);
   }
