@@ -96,6 +96,9 @@ class Remaker {
       }
     }
     for (std::size_t k = 1; k < inputs.size(); ++k) {
+      if (verb == "report") {
+        break;  // the folder holds them
+      }
       if (inputs[k] == kCalibration) {
         line += " --calibration " + inputs[k];
       } else if (verb == "simulate") {

@@ -206,6 +206,12 @@ TEST(Remake, ImportsAndPresetsToo) {
                                         : "nacre report .* --out page.html"));
   }
 
+  const Json page{
+      {"command", "report"},
+      {"inputs", Json::array({{{"folder", "demo"}}, {{"file", "calibration.json"}}})}};
+  EXPECT_EQ(cli::CommandsThatRemake(page, "page.html").back(),
+            "nacre report demo --out page.html");
+
   const Json made{{"command", "factor"},
                   {"options", {{"terms", 2}}},
                   {"inputs", Json::array({{{"dataset", Json()}}})}};
