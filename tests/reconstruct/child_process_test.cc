@@ -1,0 +1,61 @@
+#include "reconstruct/internal/child_process.h"
+
+#include "core/error.h"
+#include "core/write_all.h"
+#include "tests/support/error_message.h"
+
+#include <gmock/gmock.h>
+
+#include <csignal>
+#include <stdexcept>
+
+namespace nacre::reconstruct::internal {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string MessageOf(const std::function<void(int)>& work,
+                      ExitCode code = ExitCode::kBadData,
+                      int most_seconds = 10) {
+  return testing::ErrorMessage([&] { RunInChild("a.mat", most_seconds, work); }, code);
+}
+
+TEST(ChildProcess, WhatItWritesIsGivenBack) {
+  const auto file = RunInChild("a.mat", 10, [](int fd) {
+    Expect(WriteAll(fd, "seen "), "memory");
+    Expect(WriteAll(fd, "here"), "memory");
+  });
+  EXPECT_EQ(std::string(file->bytes().begin(), file->bytes().end()), "seen here");
+}
+
+TEST(ChildProcess, ItsErrorsAreOurs) {
+  const auto bad = [](int fd) {
+    Expect(WriteAll(fd, "a longer text than the message"), "memory");
+    throw BadData("a.mat: no");
+  };
+  EXPECT_EQ(MessageOf(bad), "a.mat: no");
+  const auto bug = [](int) { throw std::logic_error("odd"); };
+  EXPECT_EQ(MessageOf(bug, ExitCode::kBug), "odd");
+}
+
+TEST(ChildProcess, ItsDeathIsAnError) {
+  for (const int signal : {SIGSEGV, SIGABRT, SIGKILL}) {
+    const auto die = [signal](int) { std::raise(signal); };
+    EXPECT_THAT(MessageOf(die),
+                HasSubstr("a.mat: the library that reads it died of it"));
+  }
+  const auto stop = [](int) { std::raise(SIGINT); };
+  EXPECT_THAT(MessageOf(stop, ExitCode::kInterrupted), HasSubstr("stopped on request"));
+}
+
+TEST(ChildProcess, ItsTimeIsLimited) {
+  const auto go_on = [](int) {
+    for (volatile int n = 0;; n = n ^ 1) {
+    }
+  };
+  EXPECT_THAT(MessageOf(go_on, ExitCode::kBadData, 1),
+              HasSubstr("isn't read after 1 s"));
+}
+
+}  // namespace
+}  // namespace nacre::reconstruct::internal
