@@ -21,7 +21,7 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
   float brightest = 0;
   std::array<double, 3> flux{};
   std::array<double, 3> centre{};
-  Vec3 normal;
+  std::array<double, 3> normal{};  // its squares are beyond floats in very bright light
   for (std::int32_t p = begin; p < end; ++p) {
     const Patch& patch = patches[static_cast<std::size_t>(p)];
     const float weight = patch.flux_w.x + patch.flux_w.y + patch.flux_w.z;
@@ -30,8 +30,8 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
       const auto i = static_cast<std::size_t>(c);
       flux[i] += static_cast<double>(patch.flux_w[c]);
       centre[i] += static_cast<double>(weight * patch.point.position_mm[c]);
+      normal[i] += static_cast<double>(weight * patch.point.normal[c]);
     }
-    normal += patch.point.normal * weight;
     if (weight > brightest) {
       brightest = weight;
       node.brightest = p;
@@ -43,9 +43,11 @@ PatchTree::Node Summarize(const std::vector<Patch>& patches,
   node.centre_mm = {static_cast<float>(centre[0] / weight_sum),
                     static_cast<float>(centre[1] / weight_sum),
                     static_cast<float>(centre[2] / weight_sum)};
-  const float normal_length = Length(normal);
+  const double normal_length = std::hypot(normal[0], normal[1], normal[2]);
   node.normal = normal_length > 0
-                    ? normal / normal_length
+                    ? Vec3{static_cast<float>(normal[0] / normal_length),
+                           static_cast<float>(normal[1] / normal_length),
+                           static_cast<float>(normal[2] / normal_length)}
                     : patches[static_cast<std::size_t>(node.brightest)].point.normal;
   double variance = 0;
   for (std::int32_t p = begin; p < end; ++p) {

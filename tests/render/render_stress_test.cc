@@ -151,8 +151,13 @@ TEST_F(RenderStress, PicturesAreLinearInTheLight) {
   for (const double power : {1e-30, 1e-12, 1e12, 1e30}) {
     const Rendering scaled = picture(power);
     ExpectClean(scaled, Number(power));
-    // Floats' rounding, and which patches are gathered as one.
-    ExpectScaled(scaled.image, one.image, power, 1e-2, Number(power));
+    // Roundings of one light's flux, u each, on the way to a pixel, and that one node of
+    // patches is or isn't gathered as one source: DipoleOptions::negligible.
+    ExpectScaled(scaled.image, one.image, power, 2e-4 + 0x1p-20, Number(power));
+  }
+  for (const int exponent : {-100, -60, -1, 1, 60, 100}) {  // which rounds nothing
+    const double power = std::ldexp(1, exponent);
+    ExpectScaled(picture(power).image, one.image, power, 0, Number(power));
   }
   const Rendering dark = picture(0);
   ExpectClean(dark, "dark");
