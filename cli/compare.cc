@@ -6,9 +6,7 @@
 #include "core/exr.h"
 #include "core/png.h"
 #include "reconstruct/error_figures.h"
-#ifdef NACRE_HAS_FACTOR
 #include "factor/material.h"
-#endif
 
 #include <memory>
 
@@ -25,7 +23,6 @@ struct CompareArguments {
   std::filesystem::path b;
 };
 
-#ifdef NACRE_HAS_FACTOR
 SliceSource MaterialSource(const std::filesystem::path& path) {
   const auto material = std::make_shared<factor::Material>(factor::ReadMaterial(path));
   SliceSource source;
@@ -47,7 +44,6 @@ SliceSource MaterialSource(const std::filesystem::path& path) {
   };
   return source;
 }
-#endif
 
 // A picture compares as a dataset of one window-less grid: each pixel is a slice of
 // one cell. What is said about worst slices is then about pixels.
@@ -115,12 +111,7 @@ SliceSource Open(const std::filesystem::path& path, ArtefactKind kind) {
     case ArtefactKind::kDataset:
       return reconstruct::DatasetSource(path);
     case ArtefactKind::kMaterial:
-#ifdef NACRE_HAS_FACTOR
       return MaterialSource(path);
-#else
-      throw UsageError(path.string() +
-                       ": is a material, and this build was made without `factor`");
-#endif
     case ArtefactKind::kExrPicture:
       return PictureSource(ReadExrColour(path));
     case ArtefactKind::kPngPicture:

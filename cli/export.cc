@@ -4,10 +4,10 @@
 #include "cli/command_line.h"
 #include "core/error.h"
 #include "reconstruct/export/psf.h"
-#ifdef NACRE_HAS_FACTOR
 #include "cli/exchange/export_maps.h"
-#include "factor/factor.h"
 #include "factor/sss.h"
+#ifdef NACRE_HAS_FACTOR
+#include "factor/factor.h"
 #endif
 #ifdef NACRE_HAS_PRESETS
 #include "cli/preset/preset.h"
@@ -52,26 +52,32 @@ int ToPsf(const ExportArguments& args, const Common& common) {
   return 0;
 }
 
+
+factor::Material FitProfiles(const ExportArguments& args, const Common& common) {
 #ifdef NACRE_HAS_FACTOR
+  constexpr int kGaussians = 4;
+  reconstruct::RdReader reader(args.file);
+  auto fitted = factor::Factor(reader,
+                               {.method = "profiles",
+                                .terms = kGaussians,
+                                .bits = 32,
+                                .thread_count = common.thread_count,
+                                .seed = common.seed},
+                               ConsoleProgress(common));
+  Say(common, "fit: " + fitted.summary.Brief());
+  return std::move(fitted.material);
+#else
+  throw UsageError(args.file.string() +
+                   ": is a dataset; this build was made without `factor`, which would "
+                   "fit profiles to it");
+#endif
+}
 
 // A material of Gaussian profiles as it is; profiles are fitted to a dataset.
 int ToSss(const ExportArguments& args, const Common& common) {
-  factor::Material material;
-  if (DetectKind(args.file) == ArtefactKind::kMaterial) {
-    material = factor::ReadMaterial(args.file);
-  } else {
-    constexpr int kGaussians = 4;
-    reconstruct::RdReader reader(args.file);
-    auto fitted = factor::Factor(reader,
-                                 {.method = "profiles",
-                                  .terms = kGaussians,
-                                  .bits = 32,
-                                  .thread_count = common.thread_count,
-                                  .seed = common.seed},
-                                 ConsoleProgress(common));
-    Say(common, "fit: " + fitted.summary.Brief());
-    material = std::move(fitted.material);
-  }
+  const factor::Material material = DetectKind(args.file) == ArtefactKind::kMaterial
+                                        ? factor::ReadMaterial(args.file)
+                                        : FitProfiles(args, common);
   const std::int64_t bytes = factor::WriteSss(args.out, material);
   constexpr const char* kLost =
       "pitch, refractive index, what lies beyond the grid; R_d as sums of Gaussians";
@@ -111,7 +117,6 @@ int ToRenderer(const exchange::Target& target,
   return 0;
 }
 
-#endif
 
 int Run(ExportArguments& args, const Common& common) {
   args.name = args.file.lexically_normal().filename().string();
@@ -122,7 +127,6 @@ int Run(ExportArguments& args, const Common& common) {
     return ToPsf(args, common);
   }
   std::string known = "psf";
-#ifdef NACRE_HAS_FACTOR
   if (args.to == "sss") {
     return ToSss(args, common);
   }
@@ -133,7 +137,6 @@ int Run(ExportArguments& args, const Common& common) {
   for (const exchange::Target& target : exchange::Targets()) {
     known += std::string(", ") + target.name;
   }
-#endif
   throw UsageError("--to " + args.to + ": this build writes " + known);
 }
 

@@ -5,9 +5,7 @@
 #include "reconstruct/import/images.h"
 #include "reconstruct/import/npy.h"
 #include "reconstruct/import/psf.h"
-#ifdef NACRE_HAS_FACTOR
 #include "factor/sss.h"
-#endif
 #ifdef NACRE_HAS_MAT
 #include "reconstruct/import/mat.h"
 #endif
@@ -31,7 +29,6 @@ struct ImportArguments {
   reconstruct::ArrayImportOptions arrays;
 };
 
-#ifdef NACRE_HAS_FACTOR
 
 // Profiles are a material already; as a dataset they are sampled.
 ImportSummary ImportSss(const ImportArguments& args, const ProgressFunction& progress) {
@@ -51,7 +48,6 @@ ImportSummary ImportSss(const ImportArguments& args, const ProgressFunction& pro
   return summary;
 }
 
-#endif
 
 ImportSummary RunImport(const ImportArguments& args, const Common& common) {
   const ProgressFunction progress = ConsoleProgress(common);
@@ -76,11 +72,7 @@ ImportSummary RunImport(const ImportArguments& args, const Common& common) {
 #endif
   }
   if (args.from == "sss") {
-#ifdef NACRE_HAS_FACTOR
     return ImportSss(args, progress);
-#else
-    throw UsageError("--from sss: this build was made without `factor`");
-#endif
   }
   throw UsageError("--from " + args.from +
                    ": not one of psf, sss, images, npy and mat");

@@ -13,9 +13,7 @@
 #ifdef NACRE_HAS_CALIBRATE
 #include "calibrate/calibration.h"
 #endif
-#ifdef NACRE_HAS_FACTOR
 #include "factor/material.h"
-#endif
 #ifdef NACRE_HAS_PRESETS
 #include "cli/preset/preset.h"
 #endif
@@ -91,7 +89,6 @@ Json InspectDataset(const std::filesystem::path& path, const Common& common) {
 }
 
 Json InspectMaterial(const std::filesystem::path& path) {
-#ifdef NACRE_HAS_FACTOR
   const factor::Material material = factor::ReadMaterial(path);
   return {{"method", material.method},
           {"terms", material.terms},
@@ -108,10 +105,6 @@ Json InspectMaterial(const std::filesystem::path& path) {
           {"error", material.error},
           {"checksums", "verified"},
           {"provenance", ProvenanceOf(material.provenance)}};
-#else
-  throw UsageError(path.string() +
-                   ": is a material, and this build was made without `factor`");
-#endif
 }
 
 Json InspectSession(const std::filesystem::path& path, const Common& common) {
