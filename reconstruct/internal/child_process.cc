@@ -49,7 +49,7 @@ void PrepareChild(int most_seconds) {
   const rlimit none{0, 0};
   ::setrlimit(RLIMIT_CORE, &none);
   const auto seconds = static_cast<rlim_t>(most_seconds);
-  const rlimit time{seconds, seconds};
+  const rlimit time{seconds, seconds + 1};  // asked to end, then made to
   ::setrlimit(RLIMIT_CPU, &time);
   for (const int signal :
        {SIGINT, SIGTERM, SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU}) {
@@ -127,6 +127,10 @@ std::unique_ptr<MappedFile> RunInChild(const std::string& origin,
           fmt::format("{}: isn't read after {} s: damaged, or made to take long",
                       origin,
                       most_seconds));
+    case SIGKILL:
+      throw Error(origin +
+                  ": the process that read it was killed, maybe for want of "
+                  "memory");
     default:
       throw BadData(
           fmt::format("{}: the library that reads it died of it ({}): damaged, "

@@ -44,7 +44,7 @@ Rendering Picture(const std::string& body, const std::string& origin = "0, 0, 5"
 }
 
 std::string Number(double value) {
-  return fmt::format("{:e}", value);
+  return fmt::format("{}", value);  // to the last bit
 }
 
 void ExpectClean(const Rendering& r, const std::string& what) {
