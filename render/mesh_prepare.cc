@@ -132,9 +132,9 @@ struct Bounds {
   Vec3 Size() const { return high - low; }
 };
 
-void Place(TriangleMesh& mesh,
-           const MeshPrepareOptions& options,
-           MeshPrepareSummary& summary) {
+void PlaceMesh(TriangleMesh& mesh,
+               const MeshPrepareOptions& options,
+               MeshPrepareSummary& summary) {
   for (Vec3& p : mesh.positions) {
     p = Upright(p, options.up[0]);
   }
@@ -253,7 +253,7 @@ MeshPrepareSummary PrepareMesh(TriangleMesh& mesh, const MeshPrepareOptions& opt
       CheckMesh(mesh, "mesh").degenerate_triangles_dropped;
   SelectComponents(mesh, options.largest_component, summary);
   DropUnusedVertices(mesh);
-  Place(mesh, options, summary);
+  PlaceMesh(mesh, options, summary);
   ComputeNormals(mesh);
   summary.area_mm2 = SurfaceArea(mesh);
   ProjectTexture(mesh, options.width_mm);

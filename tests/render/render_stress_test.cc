@@ -89,7 +89,7 @@ class RenderStress : public ::testing::Test {
   nacre::testing::TempFolder folder_;
 };
 
-std::string Sphere(const std::string& matter, double radius = 1) {
+std::string Ball(const std::string& matter, double radius = 1) {
   return "<shape type=\"sphere\"><float name=\"radius\" value=\"" + Number(radius) +
          "\"/>" + matter + "</shape>";
 }
@@ -136,7 +136,7 @@ TEST_F(RenderStress, SizesFromAMillionthToAMillionLookAlike) {
 
 TEST_F(RenderStress, PicturesAreLinearInTheLight) {
   const std::string ball =
-      Sphere(Dipole(0.02, 3, 1.5)) +
+      Ball(Dipole(0.02, 3, 1.5)) +
       "<shape type=\"rectangle\"><transform name=\"toWorld\"><scale "
       "value=\"4\"/><translate z=\"-2\"/></transform></shape>";
   const auto picture = [&](double power) {
@@ -151,8 +151,8 @@ TEST_F(RenderStress, PicturesAreLinearInTheLight) {
   for (const double power : {1e-30, 1e-12, 1e12, 1e30}) {
     const Rendering scaled = picture(power);
     ExpectClean(scaled, Number(power));
-    // Roundings of one light's flux, u each, on the way to a pixel, and that one node of
-    // patches is or isn't gathered as one source: DipoleOptions::negligible.
+    // Roundings of one light's flux, u each, on the way to a pixel, and that one node
+    // of patches is or isn't gathered as one source: DipoleOptions::negligible.
     ExpectScaled(scaled.image, one.image, power, 2e-4 + 0x1p-20, Number(power));
   }
   for (const int exponent : {-100, -60, -1, 1, 60, 100}) {  // which rounds nothing
@@ -166,7 +166,7 @@ TEST_F(RenderStress, PicturesAreLinearInTheLight) {
 
 TEST_F(RenderStress, MoreLightThanAFloatHoldsIsSaid) {
   const Rendering r =
-      Picture(Sphere("") +
+      Picture(Ball("") +
               R"(<emitter type="point"><point name="position" x="0" y="0" z="1.2"/>
       <rgb name="intensity" value="3e38"/></emitter>)");
   EXPECT_GT(r.summary.bad_samples + r.summary.invariants.not_finite, 0);
@@ -179,21 +179,21 @@ TEST_F(RenderStress, MoreLightThanAFloatHoldsIsSaid) {
 
 // And more light out than in is said, not cut.
 TEST_F(RenderStress, MaterialsOfAnyScaleAreLinear) {
-  const Rendering one = Picture(Sphere(Svd(0.1)) + kLamp);
+  const Rendering one = Picture(Ball(Svd(0.1)) + kLamp);
   ExpectClean(one, "one");
   EXPECT_THAT(one.summary.invariants.Warnings(), IsEmpty());
   for (const double scale : {1e-30, 1e-12, 1e12, 1e30}) {
-    const Rendering scaled = Picture(Sphere(Svd(0.1 * scale)) + kLamp);
+    const Rendering scaled = Picture(Ball(Svd(0.1 * scale)) + kLamp);
     ExpectClean(scaled, Number(scale));
     ExpectScaled(scaled.image, one.image, scale, 1e-2, Number(scale));
     EXPECT_EQ(scaled.summary.invariants.Warnings().size(), scale > 1 ? 3U : 0U);
   }
-  const Rendering none = Picture(Sphere(Svd(0)) + kLamp);
+  const Rendering none = Picture(Ball(Svd(0)) + kLamp);
   ExpectClean(none, "zero");
 }
 
 TEST_F(RenderStress, OnePointOfOneCell) {
-  const Rendering r = Picture(Sphere(Svd(0.1, 1, 1)) + kSky);
+  const Rendering r = Picture(Ball(Svd(0.1, 1, 1)) + kSky);
   ExpectClean(r, "one point");
   EXPECT_GT(r.summary.invariants.EnergyRatio(), 0);
 }
@@ -211,14 +211,14 @@ TEST_F(RenderStress, ExtremesOfMedia) {
     const std::string what = fmt::format("{} {} {}", c.sigma_a, c.sigma_s, c.eta);
     RenderOptions options = Few();
     options.max_lit_points = 20000;
-    const Rendering r =
-        Render(Parse(SceneText(
-                   Sphere(Dipole(c.sigma_a, c.sigma_s, c.eta, c.mm_per_unit)) + kSky)),
-               options);
+    const Rendering r = Render(
+        Parse(
+            SceneText(Ball(Dipole(c.sigma_a, c.sigma_s, c.eta, c.mm_per_unit)) + kSky)),
+        options);
     ExpectClean(r, what);
     EXPECT_LE(r.summary.invariants.EnergyRatio(), 1.05) << what;
   }
-  EXPECT_THAT(ReaderError(SceneText(Sphere(Dipole(3, 0, 1.5)))),
+  EXPECT_THAT(ReaderError(SceneText(Ball(Dipole(3, 0, 1.5)))),
               HasSubstr("scatters in no channel"));
 }
 
@@ -229,7 +229,7 @@ TEST_F(RenderStress, EnergyOfALargeBallIsThatOfTheProfile) {
        {std::pair{0.002, 20.0}, {0.05, 10.0}, {1.0, 3.0}}) {
     RenderOptions options = Few();
     const Rendering r = Render(
-        Parse(SceneText(Sphere(Dipole(sigma_a, 3, 1.5, radius_mm)) + kSky)), options);
+        Parse(SceneText(Ball(Dipole(sigma_a, 3, 1.5, radius_mm)) + kSky)), options);
     const DipoleProfile profile(sigma_a, 3, DiffuseFresnelReflectance(1 / 1.5));
     EXPECT_NEAR(r.summary.invariants.EnergyRatio() / profile.Total(), 1, 0.05)
         << sigma_a;
