@@ -5,8 +5,8 @@
 #include "core/error.h"
 #include "core/exr.h"
 #include "core/png.h"
-#include "reconstruct/error_figures.h"
 #include "factor/material.h"
+#include "reconstruct/error_figures.h"
 
 #include <memory>
 

@@ -2,10 +2,10 @@
 
 #include "cli/artefact.h"
 #include "cli/command_line.h"
-#include "core/error.h"
-#include "reconstruct/export/psf.h"
 #include "cli/exchange/export_maps.h"
+#include "core/error.h"
 #include "factor/sss.h"
+#include "reconstruct/export/psf.h"
 #ifdef NACRE_HAS_FACTOR
 #include "factor/factor.h"
 #endif
@@ -51,7 +51,6 @@ int ToPsf(const ExportArguments& args, const Common& common) {
         args.out.string());
   return 0;
 }
-
 
 factor::Material FitProfiles(const ExportArguments& args, const Common& common) {
 #ifdef NACRE_HAS_FACTOR
@@ -116,7 +115,6 @@ int ToRenderer(const exchange::Target& target,
   Print(common, json, args.out.string() + ": for " + target.program);
   return 0;
 }
-
 
 int Run(ExportArguments& args, const Common& common) {
   args.name = args.file.lexically_normal().filename().string();

@@ -2,10 +2,10 @@
 
 #include "cli/command_line.h"
 #include "core/error.h"
+#include "factor/sss.h"
 #include "reconstruct/import/images.h"
 #include "reconstruct/import/npy.h"
 #include "reconstruct/import/psf.h"
-#include "factor/sss.h"
 #ifdef NACRE_HAS_MAT
 #include "reconstruct/import/mat.h"
 #endif
@@ -29,7 +29,6 @@ struct ImportArguments {
   reconstruct::ArrayImportOptions arrays;
 };
 
-
 // Profiles are a material already; as a dataset they are sampled.
 ImportSummary ImportSss(const ImportArguments& args, const ProgressFunction& progress) {
   const factor::Material m = factor::ReadSss(args.file,
@@ -47,7 +46,6 @@ ImportSummary ImportSss(const ImportArguments& args, const ProgressFunction& pro
   }
   return summary;
 }
-
 
 ImportSummary RunImport(const ImportArguments& args, const Common& common) {
   const ProgressFunction progress = ConsoleProgress(common);

@@ -1,5 +1,7 @@
 #include "cli/network_check.h"
 
+#include "core/file_descriptor.h"
+
 #include <arpa/inet.h>
 #include <array>
 #include <cerrno>
@@ -28,22 +30,6 @@ constexpr int kFrames = 100;
 constexpr int kBufferBytes = 4'000'000;  // AravisOptions' default
 constexpr std::chrono::milliseconds kTime{300};
 
-class Socket {
- public:
-  Socket() : fd_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {}
-  ~Socket() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-    }
-  }
-  Socket(const Socket&) = delete;
-  Socket& operator=(const Socket&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
-
 struct Loss {
   int frames = 0;
   int incomplete = 0;
@@ -65,8 +51,8 @@ bool ReceiveFrame(int fd) {
 
 // Empty if this machine has no loopback to bind to.
 std::optional<Loss> Measure() {
-  const Socket receiver;
-  const Socket sender;
+  const FileDescriptor receiver(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  const FileDescriptor sender(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);

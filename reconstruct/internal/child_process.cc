@@ -1,6 +1,7 @@
 #include "reconstruct/internal/child_process.h"
 
 #include "core/error.h"
+#include "core/file_descriptor.h"
 #include "core/write_all.h"
 
 #include <algorithm>
@@ -25,22 +26,6 @@ constexpr std::array kKnown = {ExitCode::kFailed,
                                ExitCode::kBadData,
                                ExitCode::kBug,
                                ExitCode::kInterrupted};
-
-class Descriptor {
- public:
-  explicit Descriptor(int fd) : fd_(fd) {}
-  ~Descriptor() {
-    if (fd_ >= 0) {
-      ::close(fd_);
-    }
-  }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  int fd() const { return fd_; }
-
- private:
-  int fd_;
-};
 
 // Handlers of the parent's (interruption, sanitizers) have nothing to say here, and a
 // crash is expected: no core of it.
@@ -96,7 +81,7 @@ std::string TextOf(const std::filesystem::path& path) {
 std::unique_ptr<MappedFile> RunInChild(const std::string& origin,
                                        int most_seconds,
                                        const std::function<void(int fd)>& work) {
-  const Descriptor result(::memfd_create("nacre", MFD_CLOEXEC));
+  const FileDescriptor result(::memfd_create("nacre", MFD_CLOEXEC));
   if (result.fd() < 0) {
     throw SystemError(origin + ": cannot make a file in memory");
   }
