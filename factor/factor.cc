@@ -56,7 +56,7 @@ std::int64_t WorkingBytes(const reconstruct::RdHeader& header,
       : options.method == "profiles"
           ? 8 * static_cast<double>(header.PointCount()) * channels * options.terms
       : options.method == "tucker"
-          ? 16 * window * window + 24 * window * internal::kBlockRows
+          ? 36 * window * window + 24 * window * internal::kBlockRows
           : 8 * window * window * channels * options.clusters;
   const double bytes = method_bytes +
                        (8 + 5) * window * channels * internal::kBlockRows +
@@ -301,8 +301,8 @@ Factorization FactorData(Dataset& dataset,
 }  // namespace
 
 bool SharesWork(const std::string& method) {
-  return internal::IsSvd(method) || method == "reciprocal" ||
-         method == internal::kAutoMethod;
+  return internal::IsSvd(method) || method == "reciprocal" || method == "nmf" ||
+         method == "tucker" || method == internal::kAutoMethod;
 }
 
 const std::vector<std::string>& FactorMethods() {

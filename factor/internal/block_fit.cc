@@ -111,7 +111,7 @@ void FitByBlocks(SliceSource& source,
   for (BlockSvd& svd : found.svds) {
     model.excess = std::max(model.excess, svd.excess);
     if (!has_missing) {  // else they belong to the values filled before
-      JoinPassRows(header.PointCount(), options.ranks, std::span<float>(svd.scores));
+      PassLots(header.PointCount()).Join(options.ranks, std::span<float>(svd.scores));
       model.scores.push_back(std::move(svd.scores));
     }
   }

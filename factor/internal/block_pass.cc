@@ -12,20 +12,6 @@ namespace {
 constexpr std::int64_t kRows = 128;  // whose sums are floats; they fit the cache
 constexpr std::int64_t kLanes = 8;   // sums kept apart, so that as many threads can add
 constexpr std::int64_t kChunk = kRows * kLanes;  // read at a time
-constexpr std::int64_t kMostLots = 64;           // of chunks, summed apart for ranks
-
-std::int64_t ChunkCount(std::int64_t points) {
-  return (points + kChunk - 1) / kChunk;
-}
-
-std::int64_t LotCount(std::int64_t points) {
-  return std::min(kMostLots, ChunkCount(points));
-}
-
-// The first row of a lot.
-std::int64_t LotBegin(std::int64_t lot, std::int64_t points) {
-  return std::min(points, lot * ChunkCount(points) / LotCount(points) * kChunk);
-}
 
 using FloatRows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -150,14 +136,8 @@ class ChannelPass {
 
 }  // namespace
 
-RankShare PassShare(std::int64_t points, int rank, int size) {
-  const RankShare lots = ShareOf(LotCount(points), rank, size);
-  return {LotBegin(lots.begin, points), LotBegin(lots.end, points)};
-}
-
-RankShare PassShare(std::int64_t points, const Ranks* ranks) {
-  return ranks == nullptr ? RankShare{0, points}
-                          : PassShare(points, ranks->rank(), ranks->size());
+RowLots PassLots(std::int64_t points) {
+  return RowLots(points, kChunk);
 }
 
 std::vector<BlockProduct> RunBlockPass(SliceSource& source,
@@ -185,11 +165,12 @@ std::vector<BlockProduct> RunBlockPass(SliceSource& source,
                          });
     });
   };
-  LotSum sum(LotCount(points), workers.ranks);
-  const RankShare lots = ShareOf(LotCount(points), workers.ranks);
-  for (std::int64_t lot = lots.begin; lot < lots.end; ++lot) {
-    const std::int64_t end = LotBegin(lot + 1, points);
-    for (std::int64_t first = LotBegin(lot, points); first < end; first += kChunk) {
+  const RowLots lots = PassLots(points);
+  LotSum sum(lots.count(), workers.ranks);
+  const RankShare own = ShareOf(lots.count(), workers.ranks);
+  for (std::int64_t lot = own.begin; lot < own.end; ++lot) {
+    const std::int64_t end = lots.Begin(lot + 1);
+    for (std::int64_t first = lots.Begin(lot); first < end; first += kChunk) {
       Report(progress, {"factor", first, points, note});
       add_chunk(first, end);
     }

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/progress.h"
-#include "core/rank_shares.h"
+#include "factor/internal/row_lots.h"
 #include "factor/internal/slice_source.h"
 #include "factor/internal/truncated_svd.h"
 #include "factor/internal/workers.h"
@@ -27,17 +27,8 @@ struct BlockProduct {
   std::vector<float> u;  ///< [panel][row][kPanel]; of other ranks' rows 0
 };
 
-/// The rows of that many that this rank reads in a pass.
-RankShare PassShare(std::int64_t points, int rank, int size);
-RankShare PassShare(std::int64_t points, const Ranks* ranks);
-
-/// Collective: rows of which each rank has those of its share, in all of them.
-template <class T>
-void JoinPassRows(std::int64_t points, const Ranks* ranks, std::span<T> plane) {
-  JoinSharesBy(points, ranks, plane, [&](int rank, int size) {
-    return PassShare(points, rank, size);
-  });
-}
+/// How ranks share a pass over that many rows.
+RowLots PassLots(std::int64_t points);
 
 /// The matrices of a pass: Y is a channel's rows as `fill` makes them; a basis each,
 /// all of a whole number of panels.

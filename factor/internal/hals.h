@@ -1,6 +1,7 @@
 #pragma once
 
 #include "factor/internal/truncated_svd.h"
+#include "factor/internal/workers.h"
 
 #include <cstdint>
 
@@ -24,10 +25,15 @@ void HalsSweep(const Eigen::MatrixXd& gram,
 /// F and H of at most `terms` terms, the error not falling by 1e-5 a round any more or
 /// after `rounds`. H starts as the rows of `start`, then rows of Y that lie far apart,
 /// chosen by `seed`. Negative entries of Y count, but nothing follows them below zero.
+/// Rows of F are shared by threads and ranks; all get all.
+struct NonnegativeOptions {
+  int terms = 1;
+  int rounds = 200;
+  std::uint64_t seed = 1;
+  Workers workers = {};
+};
 Nonnegative FactorNonnegative(const RowMatrix& y,
                               const RowMatrix& start,
-                              int terms,
-                              int rounds,
-                              std::uint64_t seed);
+                              const NonnegativeOptions& options);
 
 }  // namespace nacre::factor::internal

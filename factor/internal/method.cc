@@ -165,4 +165,29 @@ Material EmptyMaterial(const reconstruct::RdHeader& header) {
   return m;
 }
 
+void ForLots(Job& job,
+             const RowLots& lots,
+             const char* note,
+             const std::function<void(const SliceBlock&)>& of_block,
+             const std::function<void()>& end_of_lot) {
+  const std::int64_t points = job.source.header().PointCount();
+  const RankShare own = ShareOf(lots.count(), job.options.ranks);
+  for (std::int64_t lot = own.begin; lot < own.end; ++lot) {
+    const std::int64_t end = lots.Begin(lot + 1);
+    for (std::int64_t first = lots.Begin(lot); first < end; first += kBlockRows) {
+      Report(job.progress, {"factor", first, points, note});
+      of_block(job.source.Read(first, std::min(kBlockRows, end - first)));
+    }
+    end_of_lot();
+  }
+  ++job.passes;
+}
+
+void JoinMaps(const Job& job, const RowLots& lots, std::vector<float>& maps) {
+  const auto points = static_cast<std::size_t>(job.source.header().PointCount());
+  for (std::size_t begin = 0; begin < maps.size(); begin += points) {
+    lots.Join(job.options.ranks, std::span(maps).subspan(begin, points));
+  }
+}
+
 }  // namespace nacre::factor::internal

@@ -2,6 +2,7 @@
 
 #include "factor/factor.h"
 #include "factor/internal/mean_slice.h"
+#include "factor/internal/row_lots.h"
 #include "factor/internal/slice_source.h"
 #include "factor/internal/workers.h"
 
@@ -73,6 +74,18 @@ void LookAtAll(Job& job);
 /// Clusters of the slices: those of `job.made` where they are the same, else by a
 /// reading.
 reconstruct::Clustering ClusterSlices(Job& job);
+
+/// A reading of this rank's lots of slices, in their order: of_block() for each block
+/// of a lot, then end_of_lot().
+void ForLots(Job& job,
+             const RowLots& lots,
+             const char* note,
+             const std::function<void(const SliceBlock&)>& of_block,
+             const std::function<void()>& end_of_lot);
+
+/// Collective: maps [map][point], of which each rank has the points of its lots, are
+/// whole on all.
+void JoinMaps(const Job& job, const RowLots& lots, std::vector<float>& maps);
 
 /// A way to make maps and kernels of a dataset.
 class Method {

@@ -5,20 +5,22 @@
 // the tail weight, so that the error counts as e² / G^q. HALS takes the place of
 // multiplicative updates, which need ten times the rounds.
 
+#include "core/lot_sum.h"
 #include "core/parallel.h"
 #include "factor/internal/hals.h"
 #include "factor/internal/method.h"
 #include "factor/internal/reuse.h"
+#include "factor/internal/row_lots.h"
 #include "reconstruct/clustering.h"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace nacre::factor::internal {
 namespace {
 
 constexpr int kSampleRows = 2048;
+constexpr std::int64_t kLotRows = 128;
 constexpr int kRounds = 200;
 constexpr int kRowSweeps = 30;
 constexpr double kRankTolerance2 = 1e-5;  // of the sample's singular values
@@ -28,6 +30,7 @@ class NmfMethod final : public Method {
   explicit NmfMethod(Job& job)
       : job_(job),
         window_(job.source.header().WindowSize()),
+        lots_(job.source.header().PointCount(), kLotRows),
         cluster_(static_cast<std::size_t>(job.source.header().PointCount()), 0) {
     if (job.options.clusters > 1) {
       reconstruct::Clustering clustering = ClusterSlices(job);
@@ -38,33 +41,30 @@ class NmfMethod final : public Method {
       root_weight_.push_back(RootWeight(scan));
     }
     sample_ = TakeSample(job.source, kSampleRows, job.options.seed);
-    for (std::size_t c = 0; c < job.scans.size(); ++c) {
-      const TruncatedSvd svd =
-          ComputeTruncatedSvd(SampleRows(c, -1), job.options.terms, 1e-8);
-      const Eigen::Index rank =
-          svd.sigma.size() == 0
-              ? 0
-              : (svd.sigma.array() > kRankTolerance2 * svd.sigma(0)).count();
-      most_ = std::max(most_, static_cast<int>(rank));
+    std::vector<int> rank(job.scans.size(), 0);
+    const RankShare own = ShareOf(std::ssize(rank), job.options.ranks);
+    for (std::int64_t c = own.begin; c < own.end; ++c) {
+      rank[static_cast<std::size_t>(c)] = RankOfSample(static_cast<std::size_t>(c));
     }
+    JoinShares(std::ssize(rank), job.options.ranks, std::span(rank));
+    most_ = std::max(1, *std::max_element(rank.begin(), rank.end()));
   }
 
   int MostTerms() const override { return most_; }
 
   Material Make(int terms) override {
-    std::vector<RowMatrix> h(Matrices());
-    std::vector<int> rounds(Matrices(), 0);
-    ParallelFor(std::ssize(h), job_.options.thread_count, [&](std::int64_t n) {
+    std::vector<RowMatrix> h;
+    for (std::int64_t n = 0; n < std::ssize(job_.scans) * clusters_; ++n) {
       const auto [channel, k] = Matrix(n);
       Nonnegative found = FactorNonnegative(SampleRows(channel, k),
                                             MadeKernels(channel, k),
-                                            terms,
-                                            kRounds,
-                                            job_.options.seed);
-      h[static_cast<std::size_t>(n)] = std::move(found.h);
-      rounds[static_cast<std::size_t>(n)] = found.rounds;
-    });
-    rounds_ += std::accumulate(rounds.begin(), rounds.end(), 0);
+                                            {.terms = terms,
+                                             .rounds = kRounds,
+                                             .seed = job_.options.seed,
+                                             .workers = WorkersOf(job_)});
+      h.push_back(std::move(found.h));
+      rounds_ += found.rounds;
+    }
     if (std::ssize(sample_.rows) < job_.source.header().PointCount()) {
       Refine(h);
     }
@@ -79,9 +79,15 @@ class NmfMethod final : public Method {
     int cluster;
   };
 
-  std::size_t Matrices() const {
-    return job_.scans.size() * static_cast<std::size_t>(clusters_);
+  int RankOfSample(std::size_t channel) const {
+    const TruncatedSvd svd =
+        ComputeTruncatedSvd(SampleRows(channel, -1), job_.options.terms, 1e-8);
+    const bool is_zero = svd.sigma.size() == 0;
+    return is_zero ? 0
+                   : static_cast<int>(
+                         (svd.sigma.array() > kRankTolerance2 * svd.sigma(0)).count());
   }
+
   Channel Matrix(std::int64_t n) const {
     return {static_cast<std::size_t>(n / clusters_), static_cast<int>(n % clusters_)};
   }
@@ -217,40 +223,60 @@ class NmfMethod final : public Method {
     }
   }
 
-  // Calls use(matrix, rows) for every block, a matrix at a time on each thread.
-  template <class Use>
-  void ForRows(const std::vector<RowMatrix>& h, const char* note, Use&& use) {
-    const std::int64_t points = job_.source.header().PointCount();
-    for (std::int64_t first = 0; first < points; first += kBlockRows) {
-      Report(job_.progress, {"factor", first, points, note});
-      const SliceBlock block =
-          job_.source.Read(first, std::min(kBlockRows, points - first));
-      ParallelFor(std::ssize(h), job_.options.thread_count, [&](std::int64_t n) {
-        use(static_cast<std::size_t>(n),
-            SolveRows(block, n, h[static_cast<std::size_t>(n)]));
-      });
-    }
-    ++job_.passes;
+  // Calls use(matrix, rows) for every block of this rank's lots, a matrix at a time on
+  // each thread, and then end_of_lot().
+  template <class Use, class EndOfLot>
+  void ForRows(const std::vector<RowMatrix>& h,
+               const char* note,
+               Use&& use,
+               EndOfLot&& end_of_lot) {
+    ForLots(
+        job_,
+        lots_,
+        note,
+        [&](const SliceBlock& block) {
+          ParallelFor(std::ssize(h), job_.options.thread_count, [&](std::int64_t n) {
+            use(static_cast<std::size_t>(n),
+                SolveRows(block, n, h[static_cast<std::size_t>(n)]));
+          });
+        },
+        end_of_lot);
   }
 
   // H given all rows.
   void Refine(std::vector<RowMatrix>& h) {
-    std::vector<Eigen::MatrixXd> gram;
-    std::vector<Eigen::MatrixXd> cross;
+    // Of each matrix FᵀF above YᵀF.
+    std::vector<Eigen::MatrixXd> sums;
     for (const RowMatrix& kernels : h) {
-      gram.push_back(Eigen::MatrixXd::Zero(kernels.rows(), kernels.rows()));
-      cross.push_back(Eigen::MatrixXd::Zero(window_, kernels.rows()));
+      sums.push_back(Eigen::MatrixXd::Zero(kernels.rows() + window_, kernels.rows()));
     }
-    ForRows(h, "kernels", [&](std::size_t n, const Rows& rows) {
-      gram[n].noalias() += rows.f.transpose() * rows.f;
-      cross[n].noalias() += rows.y.transpose() * rows.f;
-    });
-    for (std::size_t n = 0; n < h.size(); ++n) {
-      Eigen::MatrixXd columns = h[n].transpose();
+    LotSum total(lots_.count(), job_.options.ranks);
+    ForRows(
+        h,
+        "kernels",
+        [&](std::size_t n, const Rows& rows) {
+          sums[n].topRows(h[n].rows()).noalias() += rows.f.transpose() * rows.f;
+          sums[n].bottomRows(window_).noalias() += rows.y.transpose() * rows.f;
+        },
+        [&] {
+          std::vector<double> values;
+          for (Eigen::MatrixXd& of_lot : sums) {
+            values.insert(values.end(), of_lot.data(), of_lot.data() + of_lot.size());
+            of_lot.setZero();
+          }
+          total.Add(std::move(values));
+        });
+    const std::vector<double> all = total.Finish();
+    const double* next = all.data();
+    for (RowMatrix& kernels : h) {
+      const Eigen::Index terms = kernels.rows();
+      const Eigen::Map<const Eigen::MatrixXd> sum(next, terms + window_, terms);
+      next += sum.size();
+      Eigen::MatrixXd columns = kernels.transpose();
       for (int sweep = 0; sweep < kRowSweeps; ++sweep) {
-        HalsSweep(gram[n], cross[n], columns);
+        HalsSweep(sum.topRows(terms), sum.bottomRows(window_), columns);
       }
-      h[n] = columns.transpose();
+      kernels = columns.transpose();
     }
   }
 
@@ -264,7 +290,7 @@ class NmfMethod final : public Method {
     m.cluster_count = clusters_;
     m.f.assign(job_.scans.size() * term_count * points, 0.0F);
     m.h.assign(h.size() * term_count * window, 0.0F);
-    ForRows(h, "maps", [&](std::size_t n, const Rows& rows) {
+    const auto store = [&](std::size_t n, const Rows& rows) {
       const std::size_t channel = n / static_cast<std::size_t>(clusters_);
       for (Eigen::Index j = 0; j < rows.f.cols(); ++j) {
         float* map =
@@ -274,7 +300,9 @@ class NmfMethod final : public Method {
               static_cast<float>(rows.f(static_cast<Eigen::Index>(r), j));
         }
       }
-    });
+    };
+    ForRows(h, "maps", store, [] {});
+    JoinMaps(job_, lots_, m.f);
     std::vector<double> sizes = Normalize(m);
     for (std::size_t n = 0; n < h.size(); ++n) {
       const std::size_t channel = n / static_cast<std::size_t>(clusters_);
@@ -313,6 +341,7 @@ class NmfMethod final : public Method {
 
   Job& job_;
   Eigen::Index window_;
+  RowLots lots_;
   std::vector<std::uint8_t> cluster_;
   int clusters_ = 1;
   int most_ = 1;

@@ -69,10 +69,11 @@ void RowScans::Join(const Ranks* ranks) {
     return;
   }
   const auto count = static_cast<std::size_t>(points);
+  const RowLots lots = PassLots(points);
   for (std::size_t begin = 0; begin < low.size(); begin += count) {
-    JoinPassRows(points, ranks, std::span<float>(low).subspan(begin, count));
-    JoinPassRows(points, ranks, std::span<float>(high).subspan(begin, count));
-    JoinPassRows(points, ranks, std::span<double>(total).subspan(begin, count));
+    lots.Join(ranks, std::span<float>(low).subspan(begin, count));
+    lots.Join(ranks, std::span<float>(high).subspan(begin, count));
+    lots.Join(ranks, std::span<double>(total).subspan(begin, count));
   }
   std::int64_t missing[] = {has_missing ? 1 : 0};
   ranks->Sum(missing);

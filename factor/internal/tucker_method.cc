@@ -4,9 +4,11 @@
 // polynomial whose coefficients are found for each row by least squares.
 
 #include "core/error.h"
+#include "core/lot_sum.h"
 #include "core/parallel.h"
 #include "factor/internal/method.h"
 #include "factor/internal/row_basis.h"
+#include "factor/internal/row_lots.h"
 #include "factor/internal/tucker.h"
 #include "factor/internal/tucker_als.h"
 
@@ -19,6 +21,8 @@ namespace nacre::factor::internal {
 namespace {
 
 constexpr Eigen::Index kPanelColumns = 64;
+constexpr std::int64_t kLotRows = 128;
+constexpr std::int64_t kMostLots = 16;  // Gram matrices are large
 
 Job& Checked(Job& job) {
   if (job.options.clusters > 1) {
@@ -35,10 +39,10 @@ class TuckerMethod final : public Method {
       : job_(Checked(job)),
         header_(job.source.header()),
         window_(header_.WindowSize()),
+        lots_(header_.PointCount(), kLotRows, kMostLots),
         channels_(header_.channels.size()) {
-    const GramSum sum = SumRows();
     kernels_ = TuckerKernels(
-        sum.gram,
+        SumRows(),
         header_.core,
         {.terms = job.options.terms, .window_rank = WindowRank(), .on_round = {}});
   }
@@ -61,16 +65,13 @@ class TuckerMethod final : public Method {
           return static_cast<float>(value);
         });
     const Eigen::MatrixXd to_coordinates = CoordinatesOf(kernels);
-    const std::int64_t points = header_.PointCount();
-    for (std::int64_t first = 0; first < points; first += kBlockRows) {
-      Report(job_.progress, {"factor", first, points, "maps"});
-      const SliceBlock block =
-          job_.source.Read(first, std::min(kBlockRows, points - first));
+    const auto store = [&](const SliceBlock& block) {
       ParallelFor(block.count, job_.options.thread_count, [&](std::int64_t row) {
         StoreRow(block, row, to_coordinates, m);
       });
-    }
-    ++job_.passes;
+    };
+    ForLots(job_, lots_, "maps", store, [] {});
+    JoinMaps(job_, lots_, m.f);
     return m;
   }
 
@@ -115,14 +116,11 @@ class TuckerMethod final : public Method {
     return row;
   }
 
-  GramSum SumRows() {
+  // YᵀY of the rows, its lower triangle.
+  Eigen::MatrixXd SumRows() {
     GramSum sum(window_);
-    const std::int64_t points = header_.PointCount();
     const Eigen::Index panels = (window_ + kPanelColumns - 1) / kPanelColumns;
-    for (std::int64_t first = 0; first < points; first += kBlockRows) {
-      Report(job_.progress, {"factor", first, points, "sums"});
-      const SliceBlock block =
-          job_.source.Read(first, std::min(kBlockRows, points - first));
+    const auto add = [&](const SliceBlock& block) {
       RowMatrix y(block.count, window_);
       ParallelFor(block.count, job_.options.thread_count, [&](std::int64_t r) {
         const Row row = MakeRow(Channels(block, r));
@@ -133,9 +131,23 @@ class TuckerMethod final : public Method {
         const Eigen::Index column = panel * kPanelColumns;
         sum.AddPanel(y, weight, column, std::min(kPanelColumns, window_ - column));
       });
+    };
+    LotSum total(lots_.count(), job_.options.ranks);
+    ForLots(job_, lots_, "sums", add, [&] {
+      std::vector<double> columns;
+      for (Eigen::Index k = 0; k < window_; ++k) {
+        columns.insert(
+            columns.end(), &sum.gram(k, k), sum.gram.col(k).data() + window_);
+      }
+      sum.gram.setZero();
+      total.Add(std::move(columns));
+    });
+    const std::vector<double> all = total.Finish();
+    const double* next = all.data();
+    for (Eigen::Index k = 0; k < window_; next += window_ - k, ++k) {
+      std::copy_n(next, window_ - k, &sum.gram(k, k));
     }
-    ++job_.passes;
-    return sum;
+    return std::move(sum.gram);
   }
 
   void StoreRow(const SliceBlock& block,
@@ -196,6 +208,7 @@ class TuckerMethod final : public Method {
   Job& job_;
   const reconstruct::RdHeader& header_;
   Eigen::Index window_;
+  RowLots lots_;
   std::size_t channels_;
   Eigen::MatrixXd kernels_;
 };

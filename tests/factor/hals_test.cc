@@ -51,7 +51,8 @@ TEST(Hals, NothingIsNegativeAndNoSweepMakesItWorse) {
 
 TEST(Hals, AsGoodAsManyMultiplicativeUpdates) {
   const RowMatrix y = Random(60, 8, 3) * Random(8, 50, 4) + 0.02 * Random(60, 50, 5);
-  const double ours = ModelError(y, FactorNonnegative(y, {}, 6, 100, 1));
+  const double ours =
+      ModelError(y, FactorNonnegative(y, {}, {.terms = 6, .rounds = 100, .seed = 1}));
   EXPECT_LT(ours, 1.03 * ModelError(y, Multiplicative(y, 6, 2000)));
 }
 
@@ -62,14 +63,17 @@ TEST(Hals, DataOfThatFormAreFound) {
     h.row(j).segment(4 * j, 4).setLinSpaced(1, 2 + j);
   }
   const RowMatrix y = Random(50, 3, 6) * h;
-  EXPECT_LT(ModelError(y, FactorNonnegative(y, {}, 3, 500, 1)), 1e-4);
+  EXPECT_LT(
+      ModelError(y, FactorNonnegative(y, {}, {.terms = 3, .rounds = 500, .seed = 1})),
+      1e-4);
 }
 
 TEST(Hals, NegativeAndZeroRowsAreLeftAtZero) {
   RowMatrix y = Random(5, 7, 7);
   y.row(2).setZero();
   y.row(3) *= -1;
-  const Nonnegative model = FactorNonnegative(y, {}, 3, 100, 1);
+  const Nonnegative model =
+      FactorNonnegative(y, {}, {.terms = 3, .rounds = 100, .seed = 1});
   EXPECT_TRUE(model.f.allFinite());
   EXPECT_GE(model.f.minCoeff(), 0);
   EXPECT_GE(model.h.minCoeff(), 0);

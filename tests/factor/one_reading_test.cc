@@ -66,12 +66,12 @@ TEST(OneReading, GivesTheSameMaterialOnAnyNumberOfRanks) {
   }
 }
 
-// Few slices, read several times: the reciprocal model, and what is found the best.
+// Few slices, read several times.
 TEST(Factor, GivesTheSameMaterialOnAnyNumberOfRanks) {
   const RdDataset few =
       MakeChessboard({.points_x = 14, .points_y = 11, .core = 7, .noise = 0.01});
   const nacre::testing::TempFolder folder;
-  for (const char* method : {"reciprocal", "auto"}) {
+  for (const char* method : {"reciprocal", "nmf", "tucker", "auto"}) {
     FactorOptions options{.method = method, .terms = 2};
     options.thread_count = 1;
     const Factorization alone = Factor(few, options);

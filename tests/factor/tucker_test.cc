@@ -23,7 +23,9 @@ namespace {
 using nacre::testing::MakeChessboard;
 using reconstruct::RdDataset;
 
-Eigen::MatrixXd Random(Eigen::Index rows, Eigen::Index columns, std::uint64_t seed) {
+Eigen::MatrixXd RandomMatrix(Eigen::Index rows,
+                             Eigen::Index columns,
+                             std::uint64_t seed) {
   RandomStream random(seed, 0);
   return Eigen::MatrixXd::NullaryExpr(
       rows, columns, [&] { return random.Uniform() - 0.4; });
@@ -32,15 +34,16 @@ Eigen::MatrixXd Random(Eigen::Index rows, Eigen::Index columns, std::uint64_t se
 // Rows of a tensor of multilinear rank (`terms`, `rank`, `rank`): mixtures of kernels
 // A C_t Bᵀ.
 Eigen::MatrixXd LowRankRows(int core, int points, int terms, int rank) {
-  const Eigen::MatrixXd a = Random(core, rank, 1);
-  const Eigen::MatrixXd b = Random(core, rank, 2);
+  const Eigen::MatrixXd a = RandomMatrix(core, rank, 1);
+  const Eigen::MatrixXd b = RandomMatrix(core, rank, 2);
   Eigen::MatrixXd kernels(core * core, terms);
   for (int t = 0; t < terms; ++t) {
     const RowMatrix kernel =
-        a * Random(rank, rank, 10 + static_cast<std::uint64_t>(t)) * b.transpose();
+        a * RandomMatrix(rank, rank, 10 + static_cast<std::uint64_t>(t)) *
+        b.transpose();
     kernels.col(t) = Eigen::Map<const Eigen::VectorXd>(kernel.data(), core * core);
   }
-  return Random(points, terms, 3) * kernels.transpose();
+  return RandomMatrix(points, terms, 3) * kernels.transpose();
 }
 
 Eigen::MatrixXd LowerGram(const Eigen::MatrixXd& y) {
@@ -63,14 +66,14 @@ TEST(TuckerAls, RecoversATensorOfLowMultilinearRank) {
 
 TEST(TuckerAls, ASumOfSeparableKernelsIsFoundByAsManyTerms) {
   // Rank-one terms whose sides are orthogonal: those of the paper find each.
-  const Eigen::MatrixXd sides = Random(6, 6, 4).householderQr().householderQ();
+  const Eigen::MatrixXd sides = RandomMatrix(6, 6, 4).householderQr().householderQ();
   Eigen::MatrixXd kernels(36, 3);
   for (int t = 0; t < 3; ++t) {
     const RowMatrix kernel = sides.col(t) * sides.col(5 - t).transpose();
     kernels.col(t) = Eigen::Map<const Eigen::VectorXd>(kernel.data(), 36);
   }
   const Eigen::Vector3d sizes(9, 3, 1);
-  const Eigen::MatrixXd f = Random(50, 50, 5).householderQr().householderQ();
+  const Eigen::MatrixXd f = RandomMatrix(50, 50, 5).householderQr().householderQ();
   const Eigen::MatrixXd y = f.leftCols(3) * sizes.asDiagonal() * kernels.transpose();
   const Eigen::MatrixXd found = TuckerKernels(LowerGram(y), 6, {.terms = 3});
   ASSERT_EQ(found.cols(), 3);
@@ -81,7 +84,7 @@ TEST(TuckerAls, ASumOfSeparableKernelsIsFoundByAsManyTerms) {
 }
 
 TEST(TuckerAls, NoRoundTakesLess) {
-  const Eigen::MatrixXd y = Random(80, 49, 6);
+  const Eigen::MatrixXd y = RandomMatrix(80, 49, 6);
   double before = 0;
   int rounds = 0;
   int last_term = 0;

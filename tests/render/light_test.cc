@@ -9,8 +9,6 @@
 namespace nacre::render::testing {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 const char* const kPlane = R"(<shape type="rectangle">
   <transform name="toWorld"><scale value="100"/></transform>
   <bsdf type="diffuse"><rgb name="reflectance" value="0.5"/></bsdf></shape>)";
@@ -30,10 +28,11 @@ TEST(LightTest, PointLightFallsWithTheSquareAndTheCosine) {
   const std::string light = R"(<emitter type="point">
     <point name="position" x="0" y="0" z="2"/><rgb name="intensity" value="7"/></emitter>)";
   // L = ρ / π · I cos / r².
-  EXPECT_NEAR(RadianceAt(light, "0.0001, 0", 4), 0.5 / kPi * 7 / 4, 1e-5);
+  EXPECT_NEAR(RadianceAt(light, "0.0001, 0", 4), 0.5 / std::numbers::pi * 7 / 4, 1e-5);
   const double r2 = 4 + 9;
-  EXPECT_NEAR(
-      RadianceAt(light, "3, 0", 4), 0.5 / kPi * 7 / r2 * (2 / std::sqrt(r2)), 1e-5);
+  EXPECT_NEAR(RadianceAt(light, "3, 0", 4),
+              0.5 / std::numbers::pi * 7 / r2 * (2 / std::sqrt(r2)),
+              1e-5);
 }
 
 TEST(LightTest, SpotLightFallsLinearlyInAngleBetweenBeamAndCutoff) {
@@ -42,12 +41,12 @@ TEST(LightTest, SpotLightFallsLinearlyInAngleBetweenBeamAndCutoff) {
     <transform name="toWorld"><lookat origin="0, 0, 3" target="0, 0, 0"/></transform>
     </emitter>)";
   const auto expected = [](double angle_deg) {
-    const double cosine = std::cos(angle_deg * kPi / 180);
+    const double cosine = std::cos(angle_deg * std::numbers::pi / 180);
     const double falloff = angle_deg < 15 ? 1 : (45 - angle_deg) / 30;
-    return 0.5 / kPi * 9 * falloff * cosine * cosine * cosine / 9;
+    return 0.5 / std::numbers::pi * 9 * falloff * cosine * cosine * cosine / 9;
   };
   const auto at = [](double angle_deg) {
-    return std::to_string(3 * std::tan(angle_deg * kPi / 180)) + ", 0";
+    return std::to_string(3 * std::tan(angle_deg * std::numbers::pi / 180)) + ", 0";
   };
   for (const double angle_deg : {10.0, 30.0, 40.0}) {
     EXPECT_NEAR(RadianceAt(light, at(angle_deg), 16), expected(angle_deg), 2e-4);
@@ -59,7 +58,9 @@ TEST(LightTest, DirectionalLightFallsWithTheCosineOnly) {
   const std::string light = R"(<emitter type="directional">
     <vector name="direction" x="1" y="0" z="-1"/><rgb name="irradiance" value="4"/>
     </emitter>)";
-  EXPECT_NEAR(RadianceAt(light, "20, -7", 4), 0.5 / kPi * 4 * std::sqrt(0.5), 1e-5);
+  EXPECT_NEAR(RadianceAt(light, "20, -7", 4),
+              0.5 / std::numbers::pi * 4 * std::sqrt(0.5),
+              1e-5);
 }
 
 TEST(LightTest, ConstantLightGivesTheReflectance) {

@@ -4,6 +4,7 @@
 #include "factor/material.h"
 #include "render/render.h"
 #include "render/subsurface/dipole_profile.h"
+#include "render/subsurface/models.h"
 #include "tests/render/scene_text.h"
 #include "tests/render/subsurface/handmade_material.h"
 #include "tests/support/temp_folder.h"
@@ -29,6 +30,12 @@ const char* const kSky =
 const char* const kLamp =
     R"(<emitter type="point"><point name="position" x="3" y="4" z="5"/>
       <rgb name="intensity" value="20"/></emitter>)";
+
+// Rounding moves numbers of the scene by u each, on whose way to a pixel are 16 of
+// them, or 256 where they are places; and one node of patches may be gathered as one
+// source or not, which changes what is gathered by DipoleOptions::negligible at most.
+constexpr double kU = 0x1p-24;
+const double kOneNode = DipoleOptions().negligible;
 
 RenderOptions Few(int spp = 4) {
   RenderOptions options;
@@ -129,7 +136,12 @@ TEST_F(RenderStress, SizesFromAMillionthToAMillionLookAlike) {
     for (const double size : {1e-6, 1e-3, 1e3, 1e6}) {
       const Rendering scaled = picture(shape, size);
       ExpectClean(scaled, shape);
-      ExpectScaled(scaled.image, plain.image, 1, 0.02, shape + Number(size));
+      ExpectScaled(
+          scaled.image, plain.image, 1, kOneNode + 256 * kU, shape + Number(size));
+    }
+    for (const int exponent : {-20, -10, 1, 10, 20}) {  // which rounds nothing
+      const double size = std::ldexp(1, exponent);
+      ExpectScaled(picture(shape, size).image, plain.image, 1, 0, shape + Number(size));
     }
   }
 }

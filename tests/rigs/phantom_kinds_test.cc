@@ -362,7 +362,7 @@ class VoxelFiles : public ::testing::Test {
         ThrowsMessage<Error>(HasSubstr(message)))
         << keys;
   }
-  testing::TempFolder folder_;
+  nacre::testing::TempFolder folder_;
 };
 
 TEST_F(VoxelFiles, BadOnesAreRefused) {
