@@ -128,14 +128,19 @@ std::optional<RankMessage> Ranks::Poll(int tag, int from) const {
   return message;
 }
 
-// Ranks may be more than there are cores: who waits sleeps, longer and longer.
+// Ranks may be more than there are cores: who waits sleeps, each time for an eighth of
+// what it has waited so far, so that not much more than that is lost.
 RankMessage Ranks::Receive(int tag, int from) const {
-  constexpr std::chrono::microseconds kLongest{1000};
-  for (std::chrono::microseconds pause{5};; pause = std::min(2 * pause, kLongest)) {
+  using std::chrono::steady_clock;
+  constexpr steady_clock::duration kShortest = std::chrono::microseconds(5);
+  constexpr steady_clock::duration kLongest = std::chrono::milliseconds(1);
+  const steady_clock::time_point start = steady_clock::now();
+  for (;;) {
     if (std::optional<RankMessage> message = Poll(tag, from)) {
       return std::move(*message);
     }
-    std::this_thread::sleep_for(pause);
+    std::this_thread::sleep_for(
+        std::clamp((steady_clock::now() - start) / 8, kShortest, kLongest));
   }
 }
 

@@ -119,18 +119,30 @@ class MpiRanks : public Ranks {
   mutable std::list<Posted> posted_;
 };
 
+// How Open MPI carries messages between ranks of one machine, unless the user has said
+// so.
+void SetUpSharedMemory() {
+  constexpr int kKeepWhatIsSet = 0;
+  const auto set = [](const char* name, const char* value) {
+    setenv(name, value, kKeepWhatIsSet);  // NOLINT(concurrency-mt-unsafe)
+  };
+  // It reads large messages straight out of the other process' memory, and aborts where
+  // that process has died in between; through shared memory the rest goes on.
+  set("OMPI_MCA_btl_vader_single_copy_mechanism", "none");
+  // Of messages above 4 kB it sends the head, and the rest once the receiver has
+  // answered and the sender, who computes meanwhile, looks: until then the receiver
+  // spins.
+  set("OMPI_MCA_btl_vader_eager_limit", "65536");
+  set("OMPI_MCA_btl_vader_max_send_size", "65536");
+}
+
 }  // namespace
 
 std::unique_ptr<Ranks> JoinRanks() {
   if (!FindLauncher()) {
     return std::make_unique<Ranks>();
   }
-  // Open MPI reads large messages straight out of the other process' memory, and aborts
-  // where that process has died in between; through shared memory the rest goes on.
-  constexpr int kKeepWhatIsSet = 0;
-  setenv("OMPI_MCA_btl_vader_single_copy_mechanism",
-         "none",
-         kKeepWhatIsSet);  // NOLINT(concurrency-mt-unsafe)
+  SetUpSharedMemory();
   int provided = 0;
   MPI_Init_thread(nullptr, nullptr, MPI_THREAD_SERIALIZED, &provided);
   if (provided < MPI_THREAD_FUNNELED) {

@@ -159,6 +159,10 @@ class Bench:
             cases.append(case(f"factor {method}", many,
                               ["factor", "--method", method, "--terms", "10"],
                               out="o.nacre.exr", passes=2, made=True, **most))
+        for method, most_ranks in (("nmf", 64), ("tucker", 16)):
+            cases.append(case(f"factor {method}", many,
+                              ["factor", "--method", method, "--terms", "6"],
+                              out="o.nacre.exr", passes=4, made=True, most_ranks=most_ranks))
         # Its pairs are ten million at most, its sums eight, one rank after the other.
         cases.append(case("factor reciprocal", few, ["factor", "--method", "reciprocal"],
                           out="o.nacre.exr", passes=5, made=True, most_ranks=8, most_size=2e7,

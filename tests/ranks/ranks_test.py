@@ -74,6 +74,8 @@ COMMANDS = [
       "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
     (["factor", DATA, "--method", "nmf", "--terms", "2", "--threads", "1",
       "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
+    (["factor", DATA, "--method", "tucker", "--terms", "2", "--threads", "1",
+      "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
     (["factor", DATA, "--method", "reciprocal", "--terms", "2", "--sides", "1", "--threads", "1",
       "--out", "o.nacre.exr", "--json"], "o.nacre.exr"),
     (["reconstruct", SESSION, "--calibration", "c.json", "--threads", "1", "--out", "o.rd.exr"],
