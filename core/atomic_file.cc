@@ -3,8 +3,11 @@
 #include "core/error.h"
 #include "core/write_all.h"
 
+#include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <system_error>
@@ -31,6 +34,33 @@ std::filesystem::path FolderOf(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
+std::string HostName() {
+  std::array<char, 65> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown";
+}
+
+// What processes of this machine left behind that were killed while they wrote the same
+// file: names that begin and end like this one's, around the number of a process that
+// is gone.
+void RemoveAbandoned(const std::filesystem::path& folder,
+                     const std::string& begin,
+                     const std::string& end) {
+  std::error_code ignored;  // the names are ours, but maybe not the files
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::string name = entry.path().filename().string();
+    if (!name.starts_with(begin) || !name.ends_with(end)) {
+      continue;
+    }
+    pid_t process = 0;
+    const char* number = name.data() + begin.size();
+    const auto [stop, error] = std::from_chars(number, &name.back(), process);
+    const bool is_ours = error == std::errc() && *stop == '.' && process > 0;
+    if (is_ours && ::kill(process, 0) != 0 && errno == ESRCH) {
+      std::filesystem::remove(entry.path(), ignored);
+    }
+  }
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
@@ -40,11 +70,11 @@ AtomicFile::AtomicFile(std::filesystem::path path) : path_(std::move(path)) {
     throw Error(fmt::format(
         "cannot write {}: there is no folder {}", path_.string(), folder.string()));
   }
-  temporary_path_ = folder / fmt::format(".{}.{}.{}.tmp{}",
-                                         path_.stem().string(),
-                                         ::getpid(),
-                                         counter++,
-                                         path_.extension().string());
+  const std::string begin = fmt::format(".{}.{}-", path_.stem().string(), HostName());
+  const std::string end = ".tmp" + path_.extension().string();
+  RemoveAbandoned(folder, begin, end);
+  temporary_path_ =
+      folder / fmt::format("{}{}.{}{}", begin, ::getpid(), counter++, end);
 }
 
 AtomicFile::~AtomicFile() {

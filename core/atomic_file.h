@@ -8,8 +8,9 @@
 namespace nacre {
 
 /// A file under construction: written to temporary_path(), flushed to disk and renamed
-/// to its own name by Commit(). Unless committed, the destructor removes it. A reader
-/// never sees half a file.
+/// to its own name by Commit(). Unless committed, the destructor removes it; after a
+/// kill, whoever next writes the same file on the same machine. A reader never sees
+/// half a file.
 class AtomicFile {
  public:
   explicit AtomicFile(std::filesystem::path path);

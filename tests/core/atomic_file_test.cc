@@ -9,6 +9,8 @@
 #include <gtest/gtest.h>
 
 #include <fstream>
+#include <sys/wait.h>
+#include <unistd.h>
 
 namespace nacre {
 namespace {
@@ -47,6 +49,25 @@ TEST(AtomicFile, ReplacesTheOldFileWhole) {
   }
   EXPECT_EQ(ReadFile(path), "new");
   EXPECT_EQ(FilesIn(folder.path()), 1);
+}
+
+TEST(AtomicFile, RemovesWhatAKilledProcessLeftOfTheSameFile) {
+  const testing::TempFolder folder;
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const AtomicFile file(folder / "a.txt");
+    std::ofstream(file.temporary_path()) << "half";
+    const AtomicFile other(folder / "b.txt");
+    std::ofstream(other.temporary_path()) << "half";
+    ::_exit(0);
+  }
+  ::waitpid(child, nullptr, 0);
+  EXPECT_EQ(FilesIn(folder.path()), 2);
+  const AtomicFile alive(folder / "a.txt");
+  std::ofstream(alive.temporary_path()) << "this process' own";
+  WriteFile(folder / "a.txt", "whole");
+  EXPECT_EQ(FilesIn(folder.path()), 3) << "b's, the living process', and the file";
+  EXPECT_TRUE(std::filesystem::exists(alive.temporary_path()));
 }
 
 TEST(AtomicFile, NamesTheMissingFolder) {
