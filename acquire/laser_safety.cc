@@ -130,7 +130,7 @@ CheckedFrame LaserSafety::Check(LaserFrame frame, double now_s) {
 
 std::optional<std::string> LaserSafety::Refusal(const LaserFrame& frame,
                                                 double now_s) const {
-  if (const auto refusal = ShapeRefusal(frame)) {
+  if (auto refusal = ShapeRefusal(frame)) {
     return refusal;
   }
   bool dark = true;
@@ -139,7 +139,7 @@ std::optional<std::string> LaserSafety::Refusal(const LaserFrame& frame,
       continue;
     }
     dark = false;
-    if (const auto refusal = PointRefusal(point)) {
+    if (auto refusal = PointRefusal(point)) {
       return refusal;
     }
   }

@@ -213,7 +213,7 @@ std::vector<std::string> ChannelNames(const Imf::Header& header) {
 
 // The part without its values.
 ExrPart ReadHeader(const Imf::Header& header, std::size_t& bytes_left) {
-  const Imath::Box2i window = header.dataWindow();
+  const Imath::Box2i& window = header.dataWindow();
   ExrPart part;
   part.name = header.hasName() ? header.name() : std::string();
   part.width = window.max.x - window.min.x + 1;

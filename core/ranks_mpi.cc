@@ -124,7 +124,7 @@ class MpiRanks : public Ranks {
 void SetUpSharedMemory() {
   constexpr int kKeepWhatIsSet = 0;
   const auto set = [](const char* name, const char* value) {
-    setenv(name, value, kKeepWhatIsSet);  // NOLINT(concurrency-mt-unsafe)
+    setenv(name, value, kKeepWhatIsSet);
   };
   // It reads large messages straight out of the other process' memory, and aborts where
   // that process has died in between; through shared memory the rest goes on.

@@ -10,7 +10,7 @@ namespace nacre::render {
 namespace {
 
 std::string Environment(const char* name) {
-  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe)
+  const char* const value = std::getenv(name);
   return value != nullptr ? value : "";
 }
 

@@ -29,7 +29,7 @@ using testing::RunJson;
 class PresetTest : public ::testing::Test {
  protected:
   void SetUp() override {
-    setenv("NACRE_DATA", NACRE_TEST_DATA, 1);  // NOLINT(concurrency-mt-unsafe)
+    setenv("NACRE_DATA", NACRE_TEST_DATA, 1);
     reconstruct::WriteDataset(folder_ / "stone.rd.exr",
                               testing::BurleyDataset(4, 9, [](int c, int i, int) {
                                 return std::pair(0.3 + 0.2 * c + 0.02 * i, 0.4);
