@@ -31,7 +31,7 @@ KINDS = [
 
 # Where a run's state may stay behind, so that the next one goes on from it.
 RESUMABLE = re.compile(r"(^|/)\.p\.run\.json$|\.work(/|$|\.)|^o(/|$)|\.checkpoint")
-TEMPORARY = re.compile(r"(^|/)\.[^/]*\.\d+\.\d+\.tmp[^/]*$")
+TEMPORARY = re.compile(r"(^|/)\.[^/]*-\d+\.\d+\.tmp[^/]*$")
 
 
 class Trial:
@@ -100,7 +100,11 @@ class Trial:
         result = self.line.run(again, self.folder)
         if result.returncode != 0:
             return f"the next run fails: {result.stderr.strip()[-200:]}"
-        return self.differs(content(self.folder, ["."]), truth)
+        after = content(self.folder, ["."])
+        left = [name for name in after if TEMPORARY.search(name)]
+        if left:
+            return f"the next run leaves {left[0]}"
+        return self.differs(after, truth)
 
     @staticmethod
     def differs(after, truth):
