@@ -197,7 +197,8 @@ TEST_F(RenderStress, MaterialsOfAnyScaleAreLinear) {
   for (const double scale : {1e-30, 1e-12, 1e12, 1e30}) {
     const Rendering scaled = Picture(Ball(Svd(0.1 * scale)) + kLamp);
     ExpectClean(scaled, Number(scale));
-    // Within a cell R_d goes on like the profile of a medium of that albedo: not linear.
+    // Within a cell R_d goes on like the profile of a medium of that albedo: not
+    // linear.
     ExpectScaled(scaled.image, one.image, scale, 1e-2, Number(scale));
     EXPECT_EQ(scaled.summary.invariants.Warnings().size(), scale > 1 ? 3U : 0U);
   }
