@@ -89,22 +89,13 @@ FactorPlan MakePlan(const CLI::App& app,
   }
   plan.options.thread_count = common.thread_count;
   if (common.ranks != nullptr && common.ranks->size() > 1) {
-    if (factor::SharesWork(plan.options.method)) {
-      plan.options.ranks = common.ranks;
-    } else {
-      Say(common,
-          fmt::format("note: method {} works on one rank alone, the others wait",
-                      plan.options.method));
-    }
+    plan.options.ranks = common.ranks;
   }
   return plan;
 }
 
 int Run(const CLI::App& app, const FactorArguments& arguments, const Common& common) {
   const FactorPlan plan = MakePlan(app, arguments, common);
-  if (plan.options.ranks == nullptr && !common.IsRoot()) {
-    return 0;
-  }
   reconstruct::RdReader reader(arguments.dataset);
   const ProgressFunction progress = ConsoleProgress(common);
   const auto [material, summary] =

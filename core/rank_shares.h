@@ -42,6 +42,41 @@ void JoinShares(std::int64_t row_count, const Ranks* ranks, std::span<T> values)
   });
 }
 
+/// Collective: `values` are planes, [plane][row][x], of which each rank has the rows of
+/// ShareOf(row_count, rank, size) in all planes; afterwards all ranks have all.
+template <class T>
+void JoinPlanes(std::int64_t plane_count,
+                std::int64_t row_count,
+                const Ranks* ranks,
+                std::span<T> values) {
+  if (ranks == nullptr || ranks->size() == 1 || values.empty()) {
+    return;
+  }
+  const auto planes = static_cast<std::size_t>(plane_count);
+  const std::size_t plane = values.size() / planes;
+  const std::size_t width = plane / static_cast<std::size_t>(row_count);
+  const auto part = [&](int rank, std::size_t p) {
+    const RankShare share = ShareOf(row_count, rank, ranks->size());
+    return values.subspan(p * plane + static_cast<std::size_t>(share.begin) * width,
+                          static_cast<std::size_t>(share.end - share.begin) * width);
+  };
+  std::vector<T> own;
+  for (std::size_t p = 0; p < planes; ++p) {
+    const std::span<T> rows = part(ranks->rank(), p);
+    own.insert(own.end(), rows.begin(), rows.end());
+  }
+  const auto all = ranks->AllGather(ToBytes(std::span<const T>(own)));
+  for (int rank = 0; rank < ranks->size(); ++rank) {
+    const auto its = FromBytes<T>(all[static_cast<std::size_t>(rank)]);
+    auto next = its.begin();
+    for (std::size_t p = 0; p < planes; ++p) {
+      const std::span<T> rows = part(rank, p);
+      std::copy_n(next, rows.size(), rows.begin());
+      next += std::ssize(rows);
+    }
+  }
+}
+
 /// Collective: the sum of `count` vectors, of which each rank has those of its share in
 /// `own`, added one after the other in their order: the bits are those of one process,
 /// for float and double. In `total`, on all ranks. Takes as long as there are ranks

@@ -300,11 +300,6 @@ Factorization FactorData(Dataset& dataset,
 
 }  // namespace
 
-bool SharesWork(const std::string& method) {
-  return internal::IsSvd(method) || method == "reciprocal" || method == "nmf" ||
-         method == "tucker" || method == internal::kAutoMethod;
-}
-
 const std::vector<std::string>& FactorMethods() {
   static const std::vector<std::string> names = [] {
     std::vector<std::string> list;

@@ -42,8 +42,8 @@ struct FactorOptions {
   double memory_mb = 1000;
 
   int thread_count = 0;          ///< 0: all cores; doesn't change a bit of the result
-  const Ranks* ranks = nullptr;  ///< nor do these, if SharesWork(); all get the same,
-                                 ///< the root alone the invariants
+  const Ranks* ranks = nullptr;  ///< nor do these; all get the same, the root alone the
+                                 ///< invariants
   std::uint64_t seed = 1;        ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>
@@ -144,9 +144,6 @@ struct FactorOptions {
         "fit; bilinear needs all of them and says so");
   }
 };
-
-/// Whether ranks can share the work of that method. Of others each does all of it.
-bool SharesWork(const std::string& method);
 
 /// Names that FactorOptions::method may take, beside "auto".
 const std::vector<std::string>& FactorMethods();

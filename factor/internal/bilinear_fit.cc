@@ -1,6 +1,7 @@
 #include "factor/internal/bilinear_fit.h"
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/truncated_svd.h"
 
 #include <Eigen/Cholesky>
@@ -106,16 +107,44 @@ void SolveKernels(const BilinearData& data,
   }
 }
 
+// Collective: the kernels and squares of which each rank has those of its cells.
+void JoinKernels(const BilinearData& data,
+                 const Ranks* ranks,
+                 BilinearFit& fit,
+                 std::vector<Squares>& squares) {
+  const Eigen::Index terms = fit.f.rows();
+  const auto size = static_cast<std::size_t>(terms * terms);
+  std::vector<double> values(fit.h.size() * (size + 2), 0.0);  // [channel][cell]
+  for (std::size_t n = 0; n < fit.h.size(); ++n) {
+    double* to = &values[n * (size + 2)];
+    std::copy_n(fit.h[n].data(), fit.h[n].size(), to);  // others' cells: none yet, or old
+    to[size] = squares[n].all;
+    to[size + 1] = squares[n].left;
+  }
+  JoinPlanes(static_cast<std::int64_t>(data.channels),
+             static_cast<std::int64_t>(data.cells),
+             ranks,
+             std::span(values));
+  for (std::size_t n = 0; n < fit.h.size(); ++n) {
+    const double* from = &values[n * (size + 2)];
+    fit.h[n] = Eigen::Map<const Eigen::MatrixXd>(from, terms, terms);
+    squares[n] = {from[size], from[size + 1]};
+  }
+}
+
 double SolveAllKernels(const BilinearData& data,
                        int stride,
-                       int thread_count,
+                       const Workers& workers,
                        BilinearFit& fit) {
   fit.h.resize(data.channels * data.cells);
   std::vector<Squares> squares(fit.h.size());
-  ParallelFor(
-      static_cast<std::int64_t>(data.cells), thread_count, [&](std::int64_t cell) {
-        SolveKernels(data, static_cast<std::size_t>(cell), stride, fit, squares);
-      });
+  const RankShare own = ShareOf(static_cast<std::int64_t>(data.cells), workers.ranks);
+  ParallelFor(own.end - own.begin, workers.thread_count, [&](std::int64_t n) {
+    SolveKernels(data, static_cast<std::size_t>(own.begin + n), stride, fit, squares);
+  });
+  if (workers.ranks != nullptr) {
+    JoinKernels(data, workers.ranks, fit, squares);
+  }
   Squares sum;
   for (const Squares& s : squares) {
     sum.all += s.all;
@@ -266,10 +295,12 @@ RowEquations EquationsOfRow(const BilinearData& data, const BilinearFit& fit, in
 SharedMaps SolveMaps(const BilinearData& data,
                      const BilinearFit& fit,
                      double variance,
-                     int thread_count) {
+                     const Workers& workers) {
   SharedMaps solved(fit.f.rows(), fit.f.cols());
   const Eigen::Index terms = fit.f.rows();
-  ParallelFor(data.height, thread_count, [&](std::int64_t y) {
+  const RankShare own = ShareOf(data.height, workers.ranks);
+  ParallelFor(own.end - own.begin, workers.thread_count, [&](std::int64_t n) {
+    const std::int64_t y = own.begin + n;
     const RowEquations equations = EquationsOfRow(data, fit, static_cast<int>(y));
     const auto width = static_cast<std::size_t>(data.width);
     Eigen::MatrixXd normal(terms, terms);
@@ -293,6 +324,10 @@ SharedMaps SolveMaps(const BilinearData& data,
           normal.selfadjointView<Eigen::Lower>().ldlt().solve(right).cast<float>();
     }
   });
+  JoinPlanes(terms,
+             data.height,
+             workers.ranks,
+             std::span(solved.data(), static_cast<std::size_t>(solved.size())));
   return solved;
 }
 
@@ -357,7 +392,7 @@ double WeightedSquares(const BilinearData& data) {
 
 BilinearFit FitBilinear(const BilinearData& data,
                         const SharedMaps& start,
-                        int thread_count,
+                        const Workers& workers,
                         const ProgressFunction& progress) {
   BilinearFit fit{.f = start, .h = {}};
   Whiten(data, fit.f);
@@ -369,17 +404,17 @@ BilinearFit FitBilinear(const BilinearData& data,
       WeightedSquares(data) / std::max(Measurements(data), 1.0);
   SharedMaps best = fit.f;
   SharedMaps goal = fit.f;  // where the last step from `best` led
-  double least = SolveAllKernels(data, stride, thread_count, fit);
+  double least = SolveAllKernels(data, stride, workers, fit);
   double gained = 1;
   double step = 1;
   while (fit.rounds < kMostRounds && step > kLeastStep && gained > kEnough) {
     Report(progress, {"factor", fit.rounds, kMostRounds, "alternating"});
     if (step == 1) {
-      goal = SolveMaps(data, fit, least * least * per_measurement, thread_count);
+      goal = SolveMaps(data, fit, least * least * per_measurement, workers);
     }
     fit.f = best + static_cast<float>(step) * (goal - best);
     Whiten(data, fit.f);
-    const double residual = SolveAllKernels(data, stride, thread_count, fit);
+    const double residual = SolveAllKernels(data, stride, workers, fit);
     ++fit.rounds;
     if (residual < least) {
       gained = 1 - residual / least;
@@ -392,7 +427,7 @@ BilinearFit FitBilinear(const BilinearData& data,
   }
   fit.f = std::move(best);
   MakeCanonical(data, fit);
-  fit.residual = SolveAllKernels(data, 1, thread_count, fit);
+  fit.residual = SolveAllKernels(data, 1, workers, fit);
   return fit;
 }
 

@@ -2,6 +2,7 @@
 
 #include "core/progress.h"
 #include "factor/internal/bilinear_data.h"
+#include "factor/internal/workers.h"
 
 namespace nacre::factor::internal {
 
@@ -16,10 +17,11 @@ struct BilinearFit {
 /// Alternating least squares: H given f, an offset at a time over pairs, then f given H
 /// and the other points' f, a point at a time, then f is whitened. The second step
 /// takes all points at once; with the whitening it is a subspace iteration. The best
-/// round is kept. Terms come in the order of what they contribute, signs canonical.
+/// round is kept. Ranks share offsets and rows of points, all of them holding all pairs;
+/// kernels and maps go to all. Terms come in the order of what they contribute, signs canonical.
 BilinearFit FitBilinear(const BilinearData& data,
                         const SharedMaps& start,
-                        int thread_count,
+                        const Workers& workers,
                         const ProgressFunction& progress);
 
 }  // namespace nacre::factor::internal

@@ -30,8 +30,8 @@ class BilinearMethod final : public Method {
   int MostTerms() const override { return static_cast<int>(start_.rows()); }
 
   Material Make(int terms) override {
-    const BilinearFit fit = FitBilinear(
-        data_, start_.topRows(terms), job_.options.thread_count, job_.progress);
+    const BilinearFit fit =
+        FitBilinear(data_, start_.topRows(terms), WorkersOf(job_), job_.progress);
     rounds_ += fit.rounds;
     Material m = EmptyMaterial(job_.source.header());
     m.form = Form::kBilinear;

@@ -3,6 +3,7 @@
 #include "factor/internal/profiles_fit.h"
 
 #include "core/parallel.h"
+#include "core/rank_shares.h"
 #include "factor/internal/nonnegative_solve.h"
 #include "reconstruct/error_figures.h"
 
@@ -130,11 +131,15 @@ class ProfilesFit {
         radius_(header_.Radius()),
         width_(header_.points_x + 2 * radius_),
         height_(header_.points_y + 2 * radius_),
+        own_(ShareOf(height_, job.options.ranks)),
         w_(bases.size() * static_cast<std::size_t>(terms_) * MapSize(), 0.0F) {
     for (int y = 0; y < height_; ++y) {
       for (int x = 0; x < width_; ++x) {
         if (!InGrid(x - radius_, y - radius_)) {
           outside_.push_back({x - radius_, y - radius_});
+          if (y >= own_.begin && y < own_.end) {
+            own_outside_.push_back(outside_.back());
+          }
         }
       }
     }
@@ -212,30 +217,55 @@ class ProfilesFit {
 
   void Round(bool is_first) {
     std::vector<float> next = w_;
-    const std::size_t channels = bases_.size();
     std::vector<Equations> outside;
     if (!is_first) {
-      outside.assign(channels * outside_.size(), Equations(terms_));
+      outside.assign(bases_.size() * own_outside_.size(), Equations(terms_));
     }
-    const std::int64_t points = header_.PointCount();
-    for (std::int64_t first = 0; first < points; first += kBlockRows) {
-      Report(job_.progress, {"factor", first, points, "profiles"});
+    const RankShare inside = PointsOf(own_);
+    const RankShare read =
+        is_first ? inside : PointsOf({own_.begin - radius_, own_.end + radius_});
+    for (std::int64_t first = read.begin; first < read.end; first += kBlockRows) {
+      Report(job_.progress,
+             {"factor", first - read.begin, read.end - read.begin, "profiles"});
       const SliceBlock block =
-          job_.source.Read(first, std::min(kBlockRows, points - first));
+          job_.source.Read(first, std::min(kBlockRows, read.end - first));
       ParallelFor(block.count, job_.options.thread_count, [&](std::int64_t row) {
-        FitInside(block, row, is_first, next);
+        if (first + row >= inside.begin && first + row < inside.end) {
+          FitInside(block, row, is_first, next);
+        }
       });
       ParallelFor(std::ssize(outside), job_.options.thread_count, [&](std::int64_t n) {
         const auto at = static_cast<std::size_t>(n);
-        GatherOutside(block, at / outside_.size(), at % outside_.size(), outside[at]);
+        GatherOutside(block,
+                      at / own_outside_.size(),
+                      own_outside_[at % own_outside_.size()],
+                      outside[at]);
       });
     }
     w_ = std::move(next);
+    Join();
     ExtendInside();
     for (std::size_t n = 0; n < outside.size(); ++n) {
-      SolveOutside(n / outside_.size(), outside_[n % outside_.size()], outside[n]);
+      SolveOutside(
+          n / own_outside_.size(), own_outside_[n % own_outside_.size()], outside[n]);
+    }
+    if (!is_first) {
+      Join();
     }
     ++job_.passes;
+  }
+
+  // The grid's points in rows of the maps, margins counted.
+  RankShare PointsOf(RankShare rows) const {
+    const auto point = [&](std::int64_t y) {
+      return std::clamp<std::int64_t>(y - radius_, 0, header_.points_y) *
+             header_.points_x;
+    };
+    return {point(rows.begin), point(rows.end)};
+  }
+
+  void Join() {
+    JoinPlanes(std::ssize(bases_) * terms_, height_, job_.options.ranks, std::span(w_));
   }
 
   void FitInside(const SliceBlock& block,
@@ -262,9 +292,8 @@ class ProfilesFit {
   // What the block's slices say of a point of the margin.
   void GatherOutside(const SliceBlock& block,
                      std::size_t channel,
-                     std::size_t n,
+                     GridIndex to,
                      Equations& equations) {
-    const GridIndex to = outside_[n];
     const auto columns = static_cast<std::int64_t>(header_.points_x);
     const int first_row = static_cast<int>(block.first / columns);
     const int last_row = static_cast<int>((block.first + block.count - 1) / columns);
@@ -324,7 +353,9 @@ class ProfilesFit {
   int radius_;
   int width_;
   int height_;
+  RankShare own_;  // rows of the maps that this rank finds, margins counted
   std::vector<GridIndex> outside_;
+  std::vector<GridIndex> own_outside_;
   std::vector<float> w_;
 };
 

@@ -71,7 +71,7 @@ TEST(Factor, GivesTheSameMaterialOnAnyNumberOfRanks) {
   const RdDataset few =
       MakeChessboard({.points_x = 14, .points_y = 11, .core = 7, .noise = 0.01});
   const nacre::testing::TempFolder folder;
-  for (const char* method : {"reciprocal", "nmf", "tucker", "auto"}) {
+  for (const char* method : {"reciprocal", "nmf", "tucker", "bilinear", "profiles", "auto"}) {
     FactorOptions options{.method = method, .terms = 2};
     options.thread_count = 1;
     const Factorization alone = Factor(few, options);
