@@ -167,6 +167,9 @@ class Bench:
         cases.append(case("factor reciprocal", few, ["factor", "--method", "reciprocal"],
                           out="o.nacre.exr", passes=5, made=True, most_ranks=8, most_size=2e7,
                           chain=True))
+        for method, passes in (("bilinear", 4), ("profiles", 11)):
+            cases.append(case(f"factor {method}", few, ["factor", "--method", method],
+                              out="o.nacre.exr", passes=passes, made=True))
         cases.append(case("cluster", many, ["cluster", "--clusters", "8"], out="o.exr", passes=1,
                           made=True))
         cases = [c for c in cases if wanted(c["name"])]

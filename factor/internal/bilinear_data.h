@@ -3,9 +3,18 @@
 #include "factor/internal/method.h"
 #include "factor/internal/shared_maps.h"
 
+#include <algorithm>
 #include <vector>
 
 namespace nacre::factor::internal {
+
+/// Points x of planes, from x0 and y0 to before x1 and y1.
+struct PairArea {
+  int x0 = 0;
+  int x1 = 0;
+  int y0 = 0;
+  int y1 = 0;
+};
 
 /// A dataset as pairs of points. What light that enters at one point and leaves at
 /// another does is measured twice, once in the window of each; here both are one
@@ -36,6 +45,13 @@ struct BilinearData {
   }
   int OffsetY(std::size_t cell) const {
     return static_cast<int>(cell) / core - (core - 1) / 2;
+  }
+  /// Where x + d lies within the planes too.
+  PairArea OverlapOf(int du, int dv) const {
+    return {std::max(0, -du),
+            width - std::max(0, du),
+            std::max(0, -dv),
+            height - std::max(0, dv)};
   }
 };
 

@@ -17,8 +17,9 @@ struct BilinearFit {
 /// Alternating least squares: H given f, an offset at a time over pairs, then f given H
 /// and the other points' f, a point at a time, then f is whitened. The second step
 /// takes all points at once; with the whitening it is a subspace iteration. The best
-/// round is kept. Ranks share offsets and rows of points, all of them holding all pairs;
-/// kernels and maps go to all. Terms come in the order of what they contribute, signs canonical.
+/// round is kept. Ranks share offsets and rows of points, all of them holding all
+/// pairs; kernels and maps go to all. Terms come in the order of what they contribute,
+/// signs canonical.
 BilinearFit FitBilinear(const BilinearData& data,
                         const SharedMaps& start,
                         const Workers& workers,

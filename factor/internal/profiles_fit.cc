@@ -4,11 +4,9 @@
 
 #include "core/parallel.h"
 #include "core/rank_shares.h"
-#include "factor/internal/nonnegative_solve.h"
-#include "reconstruct/error_figures.h"
+#include "factor/internal/profile_equations.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace nacre::factor::internal {
@@ -18,108 +16,6 @@ namespace {
 // end lacks altogether would else take the fit anywhere.
 constexpr double kMostRatio = 8;
 constexpr double kPrior = 1e-3;  // of a point's own equations, for those of the margin
-
-// The Gaussians' values at an offset.
-using Values = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostGaussians, 1>;
-
-// The normal equations of one point.
-struct Equations {
-  Eigen::Index terms;
-  std::array<double, kMostGaussians * kMostGaussians> gram{};  // the lower triangle
-  std::array<double, kMostGaussians> cross{};
-
-  explicit Equations(Eigen::Index term_count) : terms(term_count) {}
-
-  void Add(const Values& a, double value, double weight) {
-    for (Eigen::Index i = 0; i < terms; ++i) {
-      const double weighted = weight * a(i);
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        gram[static_cast<std::size_t>(i * kMostGaussians + j)] += weighted * a(j);
-      }
-      cross[static_cast<std::size_t>(i)] += weighted * value;
-    }
-  }
-  // Pulls the unknowns towards `prior`.
-  void AddPrior(const Values& strength, const Values& prior) {
-    for (Eigen::Index i = 0; i < terms; ++i) {
-      gram[static_cast<std::size_t>(i * (kMostGaussians + 1))] += strength(i);
-      cross[static_cast<std::size_t>(i)] += strength(i) * prior(i);
-    }
-  }
-  Eigen::MatrixXd Gram() const {
-    Eigen::MatrixXd full(terms, terms);
-    for (Eigen::Index i = 0; i < terms; ++i) {
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        full(i, j) = full(j, i) =
-            gram[static_cast<std::size_t>(i * kMostGaussians + j)];
-      }
-    }
-    return full;
-  }
-  Eigen::VectorXd Cross() const {
-    return Eigen::Map<const Eigen::VectorXd>(cross.data(), terms);
-  }
-  Eigen::VectorXd Solve() const { return SolveNonnegative(Gram(), Cross()); }
-};
-
-std::vector<double> Weights(const ChannelScan& scan, double tail_weight) {
-  const double largest = *std::max_element(scan.mean.begin(), scan.mean.end());
-  const double scale = largest > 0 ? largest : 1;
-  const double least = std::max(-scan.least / scale, reconstruct::kLogFloor);
-  std::vector<double> weights;
-  for (const double mean : scan.mean) {
-    weights.push_back(std::pow(std::max(mean / scale, 0.0) + least, -tail_weight) /
-                      (scale * scale));
-  }
-  return weights;
-}
-
-// Widths between the two ends, the narrowest first.
-std::vector<double> Series(double log_narrow, double log_wide, int terms) {
-  std::vector<double> beta;
-  for (int t = 0; t < terms; ++t) {
-    const double part = terms > 1 ? static_cast<double>(t) / (terms - 1) : 0.5;
-    const double log_sigma = log_narrow + part * (log_wide - log_narrow);
-    beta.push_back(std::exp(-2 * log_sigma));
-  }
-  return beta;
-}
-
-class MeanSliceFit {
- public:
-  MeanSliceFit(const reconstruct::RdHeader& header,
-               const ChannelScan& scan,
-               const std::vector<double>& weights)
-      : header_(header), scan_(scan), weights_(weights) {}
-
-  // Of the weighted squares, what a nonnegative sum of these Gaussians leaves.
-  double Error(const std::vector<double>& beta) const {
-    const auto terms = static_cast<Eigen::Index>(beta.size());
-    std::vector<Gaussian> gaussians;
-    for (const double b : beta) {
-      gaussians.emplace_back(b, header_.Radius(), header_.pitch_mm);
-    }
-    Equations equations(terms);
-    double squares = 0;
-    Values a(terms);
-    for (std::size_t cell = 0; cell < weights_.size(); ++cell) {
-      const auto n = static_cast<int>(cell);
-      for (Eigen::Index t = 0; t < terms; ++t) {
-        a(t) = gaussians[static_cast<std::size_t>(t)].At(
-            n % header_.core - header_.Radius(), n / header_.core - header_.Radius());
-      }
-      equations.Add(a, scan_.mean[cell], weights_[cell]);
-      squares += weights_[cell] * scan_.mean[cell] * scan_.mean[cell];
-    }
-    const Eigen::VectorXd x = equations.Solve();
-    return squares - 2 * x.dot(equations.Cross()) + x.dot(equations.Gram() * x);
-  }
-
- private:
-  const reconstruct::RdHeader& header_;
-  const ChannelScan& scan_;
-  const std::vector<double>& weights_;
-};
 
 class ProfilesFit {
  public:
@@ -191,7 +87,7 @@ class ProfilesFit {
                GridIndex to,
                bool self_is_from,
                bool is_first,
-               Equations& equations) {
+               ProfileEquations& equations) {
     const GridIndex d{to.x - from.x, to.y - from.y};
     const std::int64_t cell =
         std::int64_t{d.y + radius_} * header_.core + d.x + radius_;
@@ -203,7 +99,7 @@ class ProfilesFit {
     if (block.valid[at] == 0) {
       return;
     }
-    Values a(terms_);
+    GaussianValues a(terms_);
     for (Eigen::Index t = 0; t < terms_; ++t) {
       a(t) = bases_[channel].gaussians[static_cast<std::size_t>(t)].At(d.x, d.y);
     }
@@ -217,9 +113,9 @@ class ProfilesFit {
 
   void Round(bool is_first) {
     std::vector<float> next = w_;
-    std::vector<Equations> outside;
+    std::vector<ProfileEquations> outside;
     if (!is_first) {
-      outside.assign(bases_.size() * own_outside_.size(), Equations(terms_));
+      outside.assign(bases_.size() * own_outside_.size(), ProfileEquations(terms_));
     }
     const RankShare inside = PointsOf(own_);
     const RankShare read =
@@ -276,7 +172,7 @@ class ProfilesFit {
     const GridIndex p{static_cast<int>(point % header_.points_x),
                       static_cast<int>(point / header_.points_x)};
     for (std::size_t c = 0; c < bases_.size(); ++c) {
-      Equations equations(terms_);
+      ProfileEquations equations(terms_);
       for (int v = -radius_; v <= radius_; ++v) {
         for (int u = -radius_; u <= radius_; ++u) {
           AddPair(c, block, p, {p.x + u, p.y + v}, true, is_first, equations);
@@ -293,7 +189,7 @@ class ProfilesFit {
   void GatherOutside(const SliceBlock& block,
                      std::size_t channel,
                      GridIndex to,
-                     Equations& equations) {
+                     ProfileEquations& equations) {
     const auto columns = static_cast<std::int64_t>(header_.points_x);
     const int first_row = static_cast<int>(block.first / columns);
     const int last_row = static_cast<int>((block.first + block.count - 1) / columns);
@@ -324,9 +220,9 @@ class ProfilesFit {
     }
   }
 
-  void SolveOutside(std::size_t channel, GridIndex p, Equations& equations) {
-    Values prior(terms_);
-    Values strength = Values::Zero(terms_);
+  void SolveOutside(std::size_t channel, GridIndex p, ProfileEquations& equations) {
+    GaussianValues prior(terms_);
+    GaussianValues strength = GaussianValues::Zero(terms_);
     for (Eigen::Index t = 0; t < terms_; ++t) {
       prior(t) = static_cast<double>(W(channel, t, p, w_));
     }
@@ -360,52 +256,6 @@ class ProfilesFit {
 };
 
 }  // namespace
-
-ProfileBasis ChooseGaussians(const reconstruct::RdHeader& header,
-                             const ChannelScan& scan,
-                             int terms,
-                             double tail_weight) {
-  ProfileBasis basis;
-  basis.weight = Weights(scan, tail_weight);
-  const MeanSliceFit fit(header, scan, basis.weight);
-  const double low = std::log(0.2 * header.pitch_mm);
-  const double high = std::log((2 * header.Radius() + 1) * header.pitch_mm);
-  double narrow = low;
-  double wide = high;
-  double least = fit.Error(Series(narrow, wide, terms));
-  const auto attempt = [&](double a, double b) {
-    if (a > b || a < low || b > high) {
-      return;
-    }
-    const double error = fit.Error(Series(a, b, terms));
-    if (error < least) {
-      least = error;
-      narrow = a;
-      wide = b;
-    }
-  };
-  constexpr int kCoarse = 6;
-  for (int i = 0; i <= kCoarse; ++i) {
-    for (int j = i; j <= kCoarse; ++j) {
-      attempt(low + i * (high - low) / kCoarse, low + j * (high - low) / kCoarse);
-    }
-  }
-  // Pattern search: a step either way along each end, halved.
-  for (double step = (high - low) / (2 * kCoarse); step > 0.01; step /= 2) {
-    const double a = narrow;
-    const double b = wide;
-    for (const double sign : {-1.0, 1.0}) {
-      attempt(a + sign * step, b);
-      attempt(a, b + sign * step);
-      attempt(a + sign * step, b + sign * step);
-    }
-  }
-  basis.beta_per_mm2 = Series(narrow, wide, terms);
-  for (const double beta : basis.beta_per_mm2) {
-    basis.gaussians.emplace_back(beta, header.Radius(), header.pitch_mm);
-  }
-  return basis;
-}
 
 std::vector<float> FitProfiles(Job& job,
                                const std::vector<ProfileBasis>& bases,

@@ -28,8 +28,8 @@ ProfileBasis ChooseGaussians(const reconstruct::RdHeader& header,
 /// error of √(P(x_i) P(x_o)), by rounds in each of which the profiles at the other end
 /// of each pair are held relative to a point's own, which leaves a nonnegative
 /// least-squares problem a point. The first round takes both ends to be the same: the
-/// profile that fits the slice's own rings. Each round reads all slices, a rank those of
-/// its rows of points and, for the margin, a window's radius around them.
+/// profile that fits the slice's own rings. Each round reads all slices, a rank those
+/// of its rows of points and, for the margin, a window's radius around them.
 std::vector<float> FitProfiles(Job& job,
                                const std::vector<ProfileBasis>& bases,
                                int rounds);
