@@ -196,8 +196,8 @@ std::optional<PackedFrame> AravisCamera::CapturePacked(
   return std::nullopt;
 }
 
-void AravisCamera::OnAway(std::function<void(bool away)> listener) {
-  parts_->listener = std::move(listener);
+void AravisCamera::OnAway(const std::function<void(bool away)>& listener) {
+  parts_->listener = listener;
 }
 
 CameraStatistics AravisCamera::Statistics() const {

@@ -57,7 +57,7 @@ class AravisCamera final : public Camera {
                                std::chrono::milliseconds timeout) override;
   std::optional<PackedFrame> CapturePacked(std::uint64_t picture_number,
                                            std::chrono::milliseconds timeout) override;
-  void OnAway(std::function<void(bool away)> listener) override;
+  void OnAway(const std::function<void(bool away)>& listener) override;
 
   CameraStatistics Statistics() const;
 

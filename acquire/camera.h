@@ -87,7 +87,7 @@ class Camera {
   /// The listener is called from inside SetExposureUs and Capture: with true as soon as
   /// the camera is found to be away, before it is waited for, with false once it is
   /// back. None to begin with; an empty one ends it.
-  virtual void OnAway(std::function<void(bool away)> /*listener*/) {}
+  virtual void OnAway(const std::function<void(bool away)>& /*listener*/) {}
 };
 
 }  // namespace nacre::acquire

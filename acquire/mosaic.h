@@ -14,7 +14,8 @@ inline bool IsMosaic(const std::string& mosaic) {
 /// The colour of a pixel of such a sensor: 0 red, 1 green, 2 blue. `mosaic` names the
 /// upper left two by two pixels, row by row.
 inline int ColourAt(const std::string& mosaic, int column, int row) {
-  const char colour = mosaic[static_cast<std::size_t>((row & 1) * 2 + (column & 1))];
+  const char colour =
+      mosaic[static_cast<std::size_t>(std::int64_t{row & 1} * 2 + (column & 1))];
   return colour == 'R' ? 0 : colour == 'G' ? 1 : 2;
 }
 

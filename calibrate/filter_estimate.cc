@@ -22,7 +22,7 @@ Colours MeanColours(const Frame& frame,
   Colours counts{};
   for (int y = 0; y < frame.height; ++y) {
     for (int x = 0; x < frame.width; ++x) {
-      const auto k = static_cast<std::size_t>(y * frame.width + x);
+      const auto k = static_cast<std::size_t>(std::int64_t{y} * frame.width + x);
       if (hot.empty() || !hot[k]) {
         const auto colour = static_cast<std::size_t>(acquire::ColourAt(mosaic, x, y));
         sums[colour] += frame.counts[k];

@@ -70,7 +70,7 @@ cv::Mat BytePicture(const cv::Mat& values) {
 // with.
 Corners Ordered(Corners corners, cv::Size board, const std::string& where) {
   const auto at = [&](int column, int row) -> cv::Point2f {
-    return corners[static_cast<std::size_t>(row * board.width + column)];
+    return corners[static_cast<std::size_t>(std::int64_t{row} * board.width + column)];
   };
   const cv::Point2f right = at(board.width - 1, 0) - at(0, 0) +
                             at(board.width - 1, board.height - 1) -

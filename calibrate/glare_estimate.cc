@@ -75,9 +75,10 @@ Merged Merge(const acquire::SessionReader& session,
 }
 
 double DistancePx(std::size_t k, int width, PixelPoint centre) {
-  const auto x = static_cast<double>(k % static_cast<std::size_t>(width));
-  const auto y = static_cast<double>(k / static_cast<std::size_t>(width));
-  return std::hypot(x - centre.x, y - centre.y);
+  const std::size_t column = k % static_cast<std::size_t>(width);
+  const std::size_t row = k / static_cast<std::size_t>(width);
+  return std::hypot(static_cast<double>(column) - centre.x,
+                    static_cast<double>(row) - centre.y);
 }
 
 // How far beyond a saturated pixel an exposure shows more than a shorter one says.

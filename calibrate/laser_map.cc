@@ -254,11 +254,11 @@ Matches FindLattice(const acquire::SessionReader& session,
                 count,
                 static_cast<int>(kMayBeMissed * count));
   std::vector<PointMm> observed;
+  observed.reserve(spots_px.size());
   for (const PixelPoint& spot : spots_px) {
     observed.push_back(camera.SampleFromPixel(spot));
   }
-  const Matches matches =
-      observed.empty() ? Matches() : MatchLattice(nominal, observed);
+  Matches matches = observed.empty() ? Matches() : MatchLattice(nominal, observed);
   if (matches.empty()) {
     throw BadData(fmt::format(
         "{}: the {} x {} laser spots on the reference target can't be {} in channel "
@@ -317,6 +317,7 @@ LaserMapResult EstimateLaserMap(const acquire::SessionReader& session,
                                 const RatePictures& pictures) {
   const std::vector<ScanAngle>& lattice = session.schedule().lattice();
   std::vector<PointMm> nominal;
+  nominal.reserve(lattice.size());
   for (const ScanAngle& angle : lattice) {
     nominal.push_back({angle.x_rad * session.rig().scanner.mm_per_rad,
                        angle.y_rad * session.rig().scanner.mm_per_rad});

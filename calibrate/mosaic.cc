@@ -103,7 +103,7 @@ std::vector<float> PixelShares(const ColourFilters& filters,
     const auto value = static_cast<float>(share.weight * plane.step * plane.step);
     for (int y = plane.row; y < height_px; y += plane.step) {
       for (int x = plane.column; x < width_px; x += plane.step) {
-        shares[static_cast<std::size_t>(y * width_px + x)] = value;
+        shares[static_cast<std::size_t>(std::int64_t{y} * width_px + x)] = value;
       }
     }
   }
@@ -129,7 +129,7 @@ void FillIn(const ColourFilters& filters,
   const std::vector<float> seen = picture;
   for (int y = 0; y < height_px; ++y) {
     for (int x = 0; x < width_px; ++x) {
-      const auto at = static_cast<std::size_t>(y * width_px + x);
+      const auto at = static_cast<std::size_t>(std::int64_t{y} * width_px + x);
       if (used[at] > 0) {
         continue;
       }
@@ -137,7 +137,7 @@ void FillIn(const ColourFilters& filters,
       float count = 0;
       for (int ny = std::max(0, y - 1); ny <= std::min(height_px - 1, y + 1); ++ny) {
         for (int nx = std::max(0, x - 1); nx <= std::min(width_px - 1, x + 1); ++nx) {
-          const auto k = static_cast<std::size_t>(ny * width_px + nx);
+          const auto k = static_cast<std::size_t>(std::int64_t{ny} * width_px + nx);
           const float counts = used[k] > 0 ? 1.0F : 0.0F;
           sum += counts * seen[k];
           count += counts;

@@ -33,7 +33,8 @@ std::vector<std::uint16_t> CountsOf(const Frame& frame,
     for (int y = plane.row; plane.colour == colour && y < frame.height;
          y += plane.step) {
       for (int x = plane.column; x < frame.width; x += plane.step) {
-        counts.push_back(frame.counts[static_cast<std::size_t>(y * frame.width + x)]);
+        counts.push_back(
+            frame.counts[static_cast<std::size_t>(std::int64_t{y} * frame.width + x)]);
       }
     }
   }

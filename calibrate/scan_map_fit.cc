@@ -37,6 +37,7 @@ acquire::Cubic FitCubic(const std::vector<PointMm>& inputs,
 template <class Points, class Get>
 std::vector<double> Collect(const Points& points, Get get) {
   std::vector<double> values;
+  values.reserve(points.size());
   for (const auto& point : points) {
     values.push_back(get(point));
   }

@@ -165,7 +165,7 @@ fs::path PrepareMesh(Line& line, const DemoArguments& args, const Common& common
         "--mesh is needed: a dragon as .ply.gz, .ply, .obj or .off, which "
         "scripts/fetch-dragon gets (scripts/demo does it all)");
   }
-  const fs::path prepared = args.out / "dragon.ply";
+  fs::path prepared = args.out / "dragon.ply";
   Say(common, "mesh: " + args.mesh.string());
   line.Run("mesh",
            {"mesh", args.mesh.string(), prepared.string(), "--width-mm", "126"},

@@ -54,11 +54,11 @@ std::vector<float> ReadMask(const std::filesystem::path& path, const RdHeader& h
       double sum = 0;
       for (int y = top; y < bottom; ++y) {
         for (int x = left; x < right; ++x) {
-          sum += image.values[static_cast<std::size_t>((y * image.width + x) *
-                                                       image.channel_count)];
+          sum += image.values[static_cast<std::size_t>(
+              (std::int64_t{y} * image.width + x) * image.channel_count)];
         }
       }
-      mask[static_cast<std::size_t>(j * header.points_x + i)] =
+      mask[static_cast<std::size_t>(std::int64_t{j} * header.points_x + i)] =
           static_cast<float>(sum / full / ((right - left) * (bottom - top)));
     }
   }
@@ -68,6 +68,7 @@ std::vector<float> ReadMask(const std::filesystem::path& path, const RdHeader& h
 // factor^mask: the factor where the mask is 1, nothing where it is 0.
 std::vector<float> Powers(double factor, const std::vector<float>& mask) {
   std::vector<float> powers;
+  powers.reserve(mask.size());
   for (const float m : mask) {
     powers.push_back(static_cast<float>(std::pow(factor, static_cast<double>(m))));
   }

@@ -117,7 +117,7 @@ Json InspectPly(const std::filesystem::path& path) {
     std::string value;
     words >> word >> name >> value;
     if (word == "format") {
-      json["format"] = name + " " + value;
+      json["format"] = fmt::format("{} {}", name, value);
     } else if (word == "element") {
       json[name] = value;
     } else if (word == "property") {

@@ -251,6 +251,7 @@ std::vector<ProjectStage> ReadProject(const fs::path& path) {
     throw BadData(path.string() + ": no [[stage]], of which a project is made");
   }
   std::vector<ProjectStage> stages;
+  stages.reserve(tables.size());
   for (const TomlTable& table : tables) {
     stages.push_back(ReadStage(table));
   }

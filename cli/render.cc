@@ -161,7 +161,8 @@ void DenoiseFirst(std::vector<ExrPart>& parts,
   }
 }
 
-int Run(RenderArguments& arguments, const Common& common) {
+// Refuses what can't be done, before anything is read, and fills the options.
+void Settle(RenderArguments& arguments, const Common& common) {
   if (!IsPng(arguments.out) && arguments.out.extension() != ".exr") {
     throw UsageError("--out " + arguments.out.string() +
                      ": the name must end in .exr or .png");
@@ -179,6 +180,11 @@ int Run(RenderArguments& arguments, const Common& common) {
   if (arguments.denoise) {
     render::RequireDenoiser();
   }
+}
+
+int Run(RenderArguments& arguments, const Common& common) {
+  Settle(arguments, common);
+  render::RenderOptions& options = arguments.options;
   const render::Scene scene =
       render::ReadScene(arguments.scene,
                         {.defines = ParseDefines(arguments.defines),

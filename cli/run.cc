@@ -146,7 +146,10 @@ int Run(const RunArguments& args, const Common& common) {
     }
     std::string why;
     for (const std::string& path : stage.reads) {
-      why = to_be_made.contains(path) ? path + " will change" : why;
+      if (to_be_made.contains(path)) {
+        why = path;
+        why += " will change";
+      }
     }
     if (why.empty()) {
       why = state.WhyToRun(stage);

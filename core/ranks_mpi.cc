@@ -13,9 +13,9 @@
 namespace nacre {
 namespace {
 
-// MPI counts in int: longer messages go in pieces, and one that is shorter than this
-// ends them.
-constexpr std::size_t kPiece = std::size_t{1} << 30;
+// Messages go in pieces that MPI sends at once, see SetUpSharedMemory; one that is
+// shorter than this ends them.
+constexpr std::size_t kPiece = 60 * 1024;
 
 int WorldRank() {
   int rank = 0;

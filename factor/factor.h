@@ -47,6 +47,7 @@ struct FactorOptions {
   std::uint64_t seed = 1;        ///< of the sample of rows and of the clustering
 
   template <class Self, class Visitor>
+  // NOLINTNEXTLINE(readability-function-size): a list
   static void Visit(Self& self, Visitor&& visit) {
     visit("method",
           self.method,

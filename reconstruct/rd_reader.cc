@@ -97,7 +97,7 @@ struct RdReader::File {
   }
 
   RdHeader ReadHeader(std::uintmax_t bytes) {
-    const RdHeader found = internal::HeaderFromAttributes(input.header(0), origin);
+    RdHeader found = internal::HeaderFromAttributes(input.header(0), origin);
     CheckSizes(found, bytes, origin);
     if (input.parts() != kPartCount) {
       throw BadData(fmt::format(

@@ -96,7 +96,7 @@ class JobQueue::Batch {
  private:
   std::vector<std::int64_t> TakeWaiting(std::int64_t count) {
     count = std::min(count, std::ssize(waiting_));
-    const std::vector<std::int64_t> jobs(waiting_.begin(), waiting_.begin() + count);
+    std::vector<std::int64_t> jobs(waiting_.begin(), waiting_.begin() + count);
     waiting_.erase(waiting_.begin(), waiting_.begin() + count);
     return jobs;
   }

@@ -121,8 +121,8 @@ struct Bounds {
   Vec3 low;
   Vec3 high;
   explicit Bounds(const std::vector<Vec3>& points) {
-    constexpr float infinity = std::numeric_limits<float>::infinity();
-    low = {infinity, infinity, infinity};
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    low = {kInfinity, kInfinity, kInfinity};
     high = -low;
     for (const Vec3 p : points) {
       low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};

@@ -221,6 +221,7 @@ std::optional<NamedMedium> FindNamedMedium(const std::string& name) {
 
 std::vector<std::string> NamedMediaNames() {
   std::vector<std::string> names;
+  names.reserve(std::size(kMedia));
   for (const NamedMedium& medium : kMedia) {
     names.emplace_back(medium.name);
   }

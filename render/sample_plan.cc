@@ -63,8 +63,10 @@ std::vector<SamplePlan::Tile> SamplePlan::Survey(const Accumulator& film) const 
   std::vector<Tile> own(static_cast<std::size_t>(TileCount()));
   for (int y = 0; y < film_.crop_height; ++y) {
     for (int x = 0; x < film_.crop_width; ++x) {
-      const auto pixel = static_cast<std::size_t>(y * film_.crop_width + x);
-      Tile& tile = own[static_cast<std::size_t>(y / kTile * tiles_x_ + x / kTile)];
+      const auto pixel =
+          static_cast<std::size_t>(std::int64_t{y} * film_.crop_width + x);
+      Tile& tile =
+          own[static_cast<std::size_t>(std::int64_t{y / kTile} * tiles_x_ + x / kTile)];
       const double variance = film.LuminanceOf(pixel).variance;
       tile.variance += std::isfinite(variance) ? variance : 0;
       tile.done = static_cast<int>(film.SamplesMade(pixel));
@@ -77,11 +79,11 @@ std::vector<SamplePlan::Tile> SamplePlan::Survey(const Accumulator& film) const 
       double count = 0;
       for (int j = std::max(0, y - 1); j <= std::min(tiles_y_ - 1, y + 1); ++j) {
         for (int i = std::max(0, x - 1); i <= std::min(tiles_x_ - 1, x + 1); ++i) {
-          sum += own[static_cast<std::size_t>(j * tiles_x_ + i)].variance;
+          sum += own[static_cast<std::size_t>(std::int64_t{j} * tiles_x_ + i)].variance;
           ++count;
         }
       }
-      Tile& tile = tiles[static_cast<std::size_t>(y * tiles_x_ + x)];
+      Tile& tile = tiles[static_cast<std::size_t>(std::int64_t{y} * tiles_x_ + x)];
       tile.variance = 0.5 * (tile.variance + sum / count);
       tile.pixels = static_cast<double>(PixelsOf(std::int64_t{y} * tiles_x_ + x));
       tile.deviation = std::sqrt(tile.variance / tile.pixels);

@@ -71,7 +71,7 @@ Transform Transform::LookAt(Vec3 origin, Vec3 target, Vec3 up) {
   const Vec3 top = Cross(forward, left);
   std::array<double, 16> m{};
   for (int row = 0; row < 3; ++row) {
-    const auto r = static_cast<std::size_t>(4 * row);
+    const auto r = static_cast<std::size_t>(4 * std::int64_t{row});
     m[r] = static_cast<double>(left[row]);
     m[r + 1] = static_cast<double>(top[row]);
     m[r + 2] = static_cast<double>(forward[row]);
@@ -94,7 +94,7 @@ Transform Transform::operator*(const Transform& first) const {
 }
 
 double Transform::operator()(int row, int column) const {
-  return m_[static_cast<std::size_t>(4 * row + column)];
+  return m_[static_cast<std::size_t>(4 * std::int64_t{row} + column)];
 }
 
 Vec3 Transform::Vector(Vec3 v) const {
@@ -146,7 +146,7 @@ Transform Transform::Inverse() const {
   }
   std::array<double, 16> m{};
   for (int row = 0; row < 3; ++row) {
-    const auto start = static_cast<std::size_t>(4 * row);
+    const auto start = static_cast<std::size_t>(4 * std::int64_t{row});
     for (int k = 0; k < 3; ++k) {
       const double entry = Cofactor(k, row) / determinant;
       m[start + static_cast<std::size_t>(k)] = entry;

@@ -28,7 +28,7 @@ bool IsWithin(PointMm point, const PatchModel& patch) {
 }  // namespace
 
 CameraTwin::CameraTwin(CameraModel model,
-                       std::shared_ptr<const Transport> sample,
+                       const std::shared_ptr<const Transport>& sample,
                        std::shared_ptr<const World> world,
                        int thread_count)
     : model_(std::move(model)),

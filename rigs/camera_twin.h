@@ -65,7 +65,7 @@ class CameraTwin final : public acquire::Camera {
  public:
   /// `sample`: the phantom under a Gaussian beam of the laser's spot size.
   CameraTwin(CameraModel model,
-             std::shared_ptr<const Transport> sample,
+             const std::shared_ptr<const Transport>& sample,
              std::shared_ptr<const World> world,
              int thread_count = 0);
 

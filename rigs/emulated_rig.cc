@@ -92,6 +92,7 @@ void EmulatedRig::SetLight() {
   }
   const acquire::ScanField field{laser.Info().max_angle_rad};
   std::vector<acquire::ScanAngle> angles;
+  angles.reserve(visits.size());
   for (const Visit& visit : visits) {
     angles.push_back({field.AngleFromStep(visit.x), field.AngleFromStep(visit.y)});
   }

@@ -20,7 +20,8 @@ namespace nacre::rigs {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using namespace internal;
+using namespace internal;  // NOLINT(google-build-using-namespace): forty names of
+                           // registers
 
 constexpr std::uint16_t kGvcpPort = 3956;
 constexpr std::uint32_t kMemoryBytes = 0x20000;
@@ -255,7 +256,8 @@ struct GigeCameraTwin::Parts {
                         [&](int x, int y) { return options.count(x, y, exposure_us); });
     }
     return PackCounts(Header(), [&](int x, int y) {
-      return std::uint32_t{picture[static_cast<std::size_t>(y * options.width + x)]};
+      return std::uint32_t{
+          picture[static_cast<std::size_t>(std::int64_t{y} * options.width + x)]};
     });
   }
 

@@ -123,10 +123,10 @@ void LaserView::AddReferenceSpot(PointMm centre,
   for (int column = columns.begin; column < columns.end; ++column) {
     double sum = 0;
     for (int k = 0; k < side * side; ++k) {
-      const PointMm point = map_.At(column,
-                                    row,
-                                    (k % side + 0.5) / side - 0.5,
-                                    (static_cast<double>(k / side) + 0.5) / side - 0.5);
+      const int across = k % side;
+      const int down = k / side;
+      const PointMm point =
+          map_.At(column, row, (across + 0.5) / side - 0.5, (down + 0.5) / side - 0.5);
       const double dx = (point.x - centre.x) / spot_sigma_mm_;
       const double dy = (point.y - centre.y) / spot_sigma_mm_;
       sum += std::exp(-0.5 * (dx * dx + dy * dy));

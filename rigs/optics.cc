@@ -40,6 +40,7 @@ std::vector<float> GaussianTaps(double sigma) {
     sum += (k == 0 ? 1 : 2) * taps.back();
   }
   std::vector<float> half;
+  half.reserve(taps.size());
   for (const double tap : taps) {
     half.push_back(static_cast<float>(tap / sum));
   }
@@ -130,7 +131,8 @@ int ShrinkFactor(double sigma_px) {
 float RimMean(const std::vector<float>& picture, int width, int height) {
   double sum = 0;
   const auto add = [&](int x, int y) {
-    sum += static_cast<double>(picture[static_cast<std::size_t>(y * width + x)]);
+    sum += static_cast<double>(
+        picture[static_cast<std::size_t>(std::int64_t{y} * width + x)]);
   };
   for (int x = 0; x < width; ++x) {
     add(x, 0);

@@ -59,7 +59,7 @@ MixtureMap::MixtureMap(const Layout& layout, std::vector<float> fraction)
       for (int i = 0; i < coarse.count_x; ++i) {
         const auto at = [&](int x, int y) {  // the border goes on
           return cells_[static_cast<std::size_t>(
-              fine.begin + std::min(y, fine.count_y - 1) * fine.count_x +
+              fine.begin + std::int64_t{std::min(y, fine.count_y - 1)} * fine.count_x +
               std::min(x, fine.count_x - 1))];
         };
         cells_.push_back(0.25F * (at(2 * i, 2 * j) + at(2 * i + 1, 2 * j) +

@@ -214,7 +214,7 @@ VoxelNumbers ReadNpyVoxels(const std::filesystem::path& path) {
   if (bytes.size() < kShortHead || !bytes.starts_with(kMagic)) {
     throw BadData(origin + ": isn't a NumPy file (.npy)");
   }
-  const int version = bytes[6];
+  const int version = static_cast<unsigned char>(bytes[6]);
   const std::size_t head = version == 1 ? kShortHead : 12;
   if (version < 1 || version > 3 || bytes.size() < head) {
     throw BadData(fmt::format(

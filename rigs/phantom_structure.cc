@@ -344,6 +344,7 @@ Structure ReadImages(const TomlTable& table, const Phantom& phantom) {
     names = {table.Text("file")};
   }
   std::vector<std::filesystem::path> paths;
+  paths.reserve(names.size());
   for (const std::string& name : names) {
     paths.push_back(table.Folder() / name);
   }

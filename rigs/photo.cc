@@ -77,7 +77,7 @@ void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exita
   const Phantom& phantom = scene.transport->phantom();
   const acquire::GridDescription& grid = phantom.grid;
   const Band band(grid, row);
-  const auto at = static_cast<std::size_t>(row * grid.points_x + column);
+  const auto at = static_cast<std::size_t>(std::int64_t{row} * grid.points_x + column);
   const auto light = [&](std::size_t c) {
     return scene.image->Channel(scene.image_channel[c])[at];
   };
@@ -104,7 +104,8 @@ void AddPixel(const Scene& scene, int column, int row, std::vector<float>& exita
       const std::size_t to =
           c * band.Pixels(grid) +
           static_cast<std::size_t>((y - band.first) * grid.points_x + first_column);
-      const auto count = static_cast<std::size_t>(last_column - first_column + 1);
+      const auto count =
+          static_cast<std::size_t>(std::int64_t{last_column} - first_column + 1);
       for (std::size_t k = 0; k < count; ++k) {
         exitance[to + k] += flux * window.rd[from + k];
       }

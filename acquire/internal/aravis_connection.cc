@@ -237,7 +237,8 @@ bool AravisConnection::IsDue(std::uint64_t frame_id) const {
          (*last_frame_id_ == 0xFFFF && frame_id == 1);
 }
 
-std::optional<PackedFrame> AravisConnection::Read(std::shared_ptr<ArvBuffer> buffer) {
+std::optional<PackedFrame> AravisConnection::Read(
+    const std::shared_ptr<ArvBuffer>& buffer) {
   const std::uint64_t frame_id = arv_buffer_get_frame_id(buffer.get());
   const bool due = IsDue(frame_id);
   last_frame_id_ = frame_id;

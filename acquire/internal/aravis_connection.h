@@ -61,7 +61,7 @@ class AravisConnection {
   void DropLateFrames();
   void Restart();
   ArvBuffer* WaitForBuffer(std::chrono::milliseconds timeout);
-  std::optional<PackedFrame> Read(std::shared_ptr<ArvBuffer> buffer);
+  std::optional<PackedFrame> Read(const std::shared_ptr<ArvBuffer>& buffer);
   std::shared_ptr<ArvBuffer> Lend(ArvBuffer* buffer);
   void TellNumber(std::uint64_t picture_number);
   void ReadTemperature();

@@ -55,7 +55,8 @@ std::vector<double> BurleyWindow(int core, double pitch, double d) {
   std::vector<double> window(static_cast<std::size_t>(core) *
                              static_cast<std::size_t>(core));
   const auto at = [&](int u, int v) -> double& {
-    return window[static_cast<std::size_t>((v + radius) * core + u + radius)];
+    return window[static_cast<std::size_t>(std::int64_t{v + radius} * core + u +
+                                           radius)];
   };
   // One octant; the others are its images.
   for (int v = 0; v <= radius; ++v) {

@@ -90,10 +90,14 @@ class RingTable {
     const int radius = (core - 1) / 2;
     std::vector<int> counts;
     for (int cell = 0; cell < core * core; ++cell) {
+      const int column = cell % core;
+      const int row = cell / core;
       counts.assign(static_cast<std::size_t>(ring_count_), 0);
       for (int n = 0; n < kSubcells * kSubcells; ++n) {
-        const double x = cell % core - radius + (n % kSubcells + 0.5) / kSubcells - 0.5;
-        const double y = radius - cell / core + (n / kSubcells + 0.5) / kSubcells - 0.5;
+        const int across = n % kSubcells;
+        const int down = n / kSubcells;
+        const double x = column - radius + (across + 0.5) / kSubcells - 0.5;
+        const double y = radius - row + (down + 0.5) / kSubcells - 0.5;
         // The first ring is a disc of radius 1.5, so that none is all border.
         const int ring = std::max(0, static_cast<int>(std::hypot(x, y) + 0.5) - 1);
         if (ring < ring_count_) {
@@ -226,6 +230,7 @@ ProfileFit FitProfiles(reconstruct::RdReader& reader,
   for (int j = 0; j < header.points_y; ++j) {
     Report(progress, {"fit", j, header.points_y, "profiles"});
     std::vector<reconstruct::RdSlice> row;
+    row.reserve(static_cast<std::size_t>(header.points_x));
     for (int i = 0; i < header.points_x; ++i) {
       row.push_back(reader.ReadSlice(i, j));
     }

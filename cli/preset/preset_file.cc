@@ -30,7 +30,7 @@ std::string Quoted(std::string text) {
 }
 
 std::string FileName(const TomlTable& table, const std::string& key) {
-  const std::string name = table.Text(key);
+  std::string name = table.Text(key);
   const fs::path path(name);
   if (name.empty() || path.has_parent_path() || name == "." || name == "..") {
     throw table.At(key,

@@ -150,7 +150,7 @@ class Digester {
         const int other_i = i + u - radius;
         if (other_i >= 0 && other_i < header_.points_x) {
           ComparePair({rows_.back().back(), row[static_cast<std::size_t>(other_i)]},
-                      static_cast<std::size_t>(v * header_.core + u),
+                      static_cast<std::size_t>(std::int64_t{v} * header_.core + u),
                       {PointIndex(i, j), PointIndex(other_i, other_j)});
         }
       }

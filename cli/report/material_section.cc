@@ -182,12 +182,13 @@ std::string SheetFigures(const Material& m) {
       m.cluster_count > 1
           ? fmt::format(" Of the first of {} clusters.", m.cluster_count)
           : "";
+  const int radius = (m.core - 1) / 2;
   const std::string beyond =
       m.margin > 0 ? fmt::format(" They go on for {} points beyond the grid.", m.margin)
                    : "";
   return Figure(kernels,
                 fmt::format("Kernels h(d), ±{} mm: {}.{}{}",
-                            Number((m.core - 1) / 2 * m.pitch_mm),
+                            Number(radius * m.pitch_mm),
                             is_sum ? "the shapes that every slice is a sum of"
                                    : "how light goes from one map to another",
                             FirstOf(m.KernelCount()),

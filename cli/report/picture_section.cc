@@ -65,6 +65,7 @@ Shown ShowExr(const std::filesystem::path& path, const std::string& css_class) {
         {part.width, part.height, {part.Channel(c), part.PixelCount()}}, kMaxSide));
   }
   std::vector<Plane> planes;
+  planes.reserve(small.size());
   for (const OwnedPlane& plane : small) {
     planes.push_back(plane.View());
   }

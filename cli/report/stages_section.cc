@@ -65,7 +65,7 @@ std::string StagesSection(const Json& json, const std::string& origin) {
   total.name = "all stages";
   row(total, "");
   for (std::string& cell : rows.back()) {
-    cell = cell.empty() ? cell : "<b>" + cell + "</b>";
+    cell = cell.empty() ? cell : fmt::format("<b>{}</b>", cell);
   }
   return Section(
       "Where the time went",

@@ -2,6 +2,7 @@
 
 namespace nacre::cli::report {
 
+// NOLINTNEXTLINE(readability-function-size): a sheet
 const char* StyleSheet() {
   return R"(
 :root {

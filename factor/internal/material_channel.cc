@@ -30,7 +30,8 @@ Material ChannelHeader(Material m, int channel) {
     std::vector<float> steps;
     const int set = m.MapSets() == 1 ? 0 : channel;
     for (const int n : MapsOf(m, channel)) {
-      steps.push_back(m.steps.f[static_cast<std::size_t>(set * m.MapCount() + n)]);
+      steps.push_back(
+          m.steps.f[static_cast<std::size_t>(std::int64_t{set} * m.MapCount() + n)]);
     }
     m.steps.f = std::move(steps);
     m.steps.h = {m.steps.h[m.KernelSets() == 1 ? 0 : c]};

@@ -11,7 +11,7 @@ std::string AttributesText(const ExrAttributes& attributes) {
   std::string text;
   for (const auto& [key, value] : attributes) {
     if (key.starts_with("nacre.") && key != "nacre.checksum") {
-      text += key + '=' + value + '\n';
+      text.append(key).append(1, '=').append(value).append(1, '\n');
     }
   }
   return text;

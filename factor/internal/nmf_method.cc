@@ -247,6 +247,7 @@ class NmfMethod final : public Method {
   void Refine(std::vector<RowMatrix>& h) {
     // Of each matrix FᵀF above YᵀF.
     std::vector<Eigen::MatrixXd> sums;
+    sums.reserve(h.size());
     for (const RowMatrix& kernels : h) {
       sums.push_back(Eigen::MatrixXd::Zero(kernels.rows() + window_, kernels.rows()));
     }

@@ -43,6 +43,7 @@ class MeanSliceFit {
   double Error(const std::vector<double>& beta) const {
     const auto terms = static_cast<Eigen::Index>(beta.size());
     std::vector<Gaussian> gaussians;
+    gaussians.reserve(beta.size());
     for (const double b : beta) {
       gaussians.emplace_back(b, header_.Radius(), header_.pitch_mm);
     }

@@ -43,7 +43,8 @@ class ProfilesFit {
 
   std::vector<float> Run(int rounds) {
     for (int round = 0; round < rounds; ++round) {
-      Round(round == 0);
+      is_first_ = round == 0;
+      Round();
     }
     return std::move(w_);
   }
@@ -86,7 +87,6 @@ class ProfilesFit {
                GridIndex from,
                GridIndex to,
                bool self_is_from,
-               bool is_first,
                ProfileEquations& equations) {
     const GridIndex d{to.x - from.x, to.y - from.y};
     const std::int64_t cell =
@@ -103,7 +103,7 @@ class ProfilesFit {
     for (Eigen::Index t = 0; t < terms_; ++t) {
       a(t) = bases_[channel].gaussians[static_cast<std::size_t>(t)].At(d.x, d.y);
     }
-    if (!is_first) {
+    if (!is_first_) {
       a *= self_is_from ? Ratio(channel, from, to, a) : Ratio(channel, to, from, a);
     }
     equations.Add(a,
@@ -111,15 +111,15 @@ class ProfilesFit {
                   bases_[channel].weight[static_cast<std::size_t>(cell)]);
   }
 
-  void Round(bool is_first) {
+  void Round() {
     std::vector<float> next = w_;
     std::vector<ProfileEquations> outside;
-    if (!is_first) {
+    if (!is_first_) {
       outside.assign(bases_.size() * own_outside_.size(), ProfileEquations(terms_));
     }
     const RankShare inside = PointsOf(own_);
     const RankShare read =
-        is_first ? inside : PointsOf({own_.begin - radius_, own_.end + radius_});
+        is_first_ ? inside : PointsOf({own_.begin - radius_, own_.end + radius_});
     for (std::int64_t first = read.begin; first < read.end; first += kBlockRows) {
       Report(job_.progress,
              {"factor", first - read.begin, read.end - read.begin, "profiles"});
@@ -127,7 +127,7 @@ class ProfilesFit {
           job_.source.Read(first, std::min(kBlockRows, read.end - first));
       ParallelFor(block.count, job_.options.thread_count, [&](std::int64_t row) {
         if (first + row >= inside.begin && first + row < inside.end) {
-          FitInside(block, row, is_first, next);
+          FitInside(block, row, next);
         }
       });
       ParallelFor(std::ssize(outside), job_.options.thread_count, [&](std::int64_t n) {
@@ -145,7 +145,7 @@ class ProfilesFit {
       SolveOutside(
           n / own_outside_.size(), own_outside_[n % own_outside_.size()], outside[n]);
     }
-    if (!is_first) {
+    if (!is_first_) {
       Join();
     }
     ++job_.passes;
@@ -164,10 +164,7 @@ class ProfilesFit {
     JoinPlanes(std::ssize(bases_) * terms_, height_, job_.options.ranks, std::span(w_));
   }
 
-  void FitInside(const SliceBlock& block,
-                 std::int64_t row,
-                 bool is_first,
-                 std::vector<float>& next) {
+  void FitInside(const SliceBlock& block, std::int64_t row, std::vector<float>& next) {
     const std::int64_t point = block.first + row;
     const GridIndex p{static_cast<int>(point % header_.points_x),
                       static_cast<int>(point / header_.points_x)};
@@ -175,7 +172,7 @@ class ProfilesFit {
       ProfileEquations equations(terms_);
       for (int v = -radius_; v <= radius_; ++v) {
         for (int u = -radius_; u <= radius_; ++u) {
-          AddPair(c, block, p, {p.x + u, p.y + v}, true, is_first, equations);
+          AddPair(c, block, p, {p.x + u, p.y + v}, true, equations);
         }
       }
       const Eigen::VectorXd w = equations.Solve();
@@ -201,7 +198,7 @@ class ProfilesFit {
            ++i) {
         const std::int64_t slice = j * columns + i;
         if (slice >= block.first && slice < block.first + block.count) {
-          AddPair(channel, block, {i, j}, to, false, false, equations);
+          AddPair(channel, block, {i, j}, to, false, equations);
         }
       }
     }
@@ -249,7 +246,8 @@ class ProfilesFit {
   int radius_;
   int width_;
   int height_;
-  RankShare own_;  // rows of the maps that this rank finds, margins counted
+  bool is_first_ = true;  // round
+  RankShare own_;         // rows of the maps that this rank finds, margins counted
   std::vector<GridIndex> outside_;
   std::vector<GridIndex> own_outside_;
   std::vector<float> w_;

@@ -70,7 +70,7 @@ std::vector<double> ReciprocalMapWeights(const Material& m) {
         squares[static_cast<std::size_t>(j)] += weight * sum;
       }
       for (int k = 0; k < m.rest; ++k) {
-        squares[static_cast<std::size_t>(m.terms + k)] +=
+        squares[static_cast<std::size_t>(std::int64_t{m.terms} + k)] +=
             weight * std::pow(kernel(ReciprocalKernelCount(m.terms, m.taps) + k), 2);
       }
       if (m.sides > 0) {
@@ -103,7 +103,7 @@ std::vector<double> MapWeights(const Material& m, const std::vector<double>& gai
       sum += std::pow(static_cast<double>(kernel[cell]) * gain, 2);
     }
     const int set = m.MapSets() == 1 ? 0 : channel;
-    squares[static_cast<std::size_t>(set * m.terms + term)] += sum;
+    squares[static_cast<std::size_t>(std::int64_t{set} * m.terms + term)] += sum;
   };
   for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
     for (int k = 0; k < m.cluster_count; ++k) {

@@ -22,7 +22,7 @@ class WindowTaps {
   }
 
   const std::vector<TapPoint>& At(GridIndex cell) const {
-    return points_[static_cast<std::size_t>(cell.y * core_ + cell.x)];
+    return points_[static_cast<std::size_t>(std::int64_t{cell.y} * core_ + cell.x)];
   }
 
  private:

@@ -147,7 +147,7 @@ class PairAdder {
     sums.value += value;
     sums.squared_sigma += sigma * sigma;
     sums.used += 1;
-    const auto at = static_cast<std::size_t>(y * data_.width + x);
+    const auto at = static_cast<std::size_t>(std::int64_t{y} * data_.width + x);
     if (side != nullptr) {
       side->value[at] = static_cast<float>(value);
       side->weight[at] = static_cast<float>(sigma * sigma);

@@ -88,7 +88,7 @@ Eigen::MatrixXd Whiten(const ReciprocalData& data, ReciprocalFit& fit) {
   mean /= points;
   products = products / points - mean * mean.transpose();
   products.diagonal().array() += 1e-9 * products.trace() + 1e-30;
-  const Eigen::MatrixXd root = products.llt().matrixL();
+  Eigen::MatrixXd root = products.llt().matrixL();
   const SharedMaps white = root.triangularView<Eigen::Lower>()
                                .solve((fit.f.cast<double>().colwise() - mean).eval())
                                .cast<float>();

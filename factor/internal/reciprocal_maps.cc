@@ -75,6 +75,7 @@ SharedMaps OverRows(const ReciprocalData& data,
     }
   });
   std::vector<std::span<const float>> own;
+  own.reserve(sums.size());
   for (const SharedMaps& sum : sums) {
     own.emplace_back(sum.data(), static_cast<std::size_t>(sum.size()));
   }

@@ -73,7 +73,8 @@ Whitened Whiten(const ReciprocalData& data,
         rows.Look(y);
         rows.Model(s.data());
         added.assign(s.size(), 0.0F);
-        const auto first = static_cast<std::size_t>(y * data.width + rows.area().x0);
+        const auto first =
+            static_cast<std::size_t>(std::int64_t{y} * data.width + rows.area().x0);
         for (Eigen::Index k = 0; k < rest.u.rows(); ++k) {
           const double v =
               rest.v(k, static_cast<Eigen::Index>(c * data.cells) + data.held[n]);

@@ -67,7 +67,7 @@ void ReciprocalRows::Look(int y) {
     there.push_back(Map(maps_, k, du_, dv_));
   }
   for (int j = 0; j < terms_; ++j) {
-    const float* pairs = &pairs_[static_cast<std::size_t>(j * terms_)];
+    const float* pairs = &pairs_[static_cast<std::size_t>(std::int64_t{j} * terms_)];
     const float ends = end_weights_[static_cast<std::size_t>(j)];
     LinearCombination(there.data(), pairs, there.size(), ends, n, First(j));
     LinearCombination(here.data(), pairs, here.size(), ends, n, Second(j));

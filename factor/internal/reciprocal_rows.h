@@ -44,7 +44,7 @@ class ReciprocalRows {
 
  private:
   std::size_t At(int y, int dx, int dy) const {
-    return static_cast<std::size_t>((y + dy) * width_ + area_.x0 + dx);
+    return static_cast<std::size_t>(std::int64_t{y + dy} * width_ + area_.x0 + dx);
   }
   const float* Map(const SharedMaps& maps, int term, int dx, int dy) const {
     return &maps(term, static_cast<Eigen::Index>(At(y_, dx, dy)));

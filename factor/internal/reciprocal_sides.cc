@@ -208,7 +208,8 @@ void FitSides(const std::vector<PairSides>& near,
   double square = 0;
   for (int y = data.margin; y < data.margin + grid_height; ++y) {
     for (int x = data.margin; x < data.margin + grid_width; ++x) {
-      const double q = fit.map()[static_cast<std::size_t>(y * data.width + x)];
+      const double q =
+          fit.map()[static_cast<std::size_t>(std::int64_t{y} * data.width + x)];
       mean += q / points;
       square += q * q / points;
     }

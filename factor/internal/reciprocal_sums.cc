@@ -101,7 +101,7 @@ class OffsetRows {
     }
     for (int j = 0; j < m_.terms; ++j) {
       LinearCombination(rows_.data(),
-                        &pairs_[static_cast<std::size_t>(j * m_.terms)],
+                        &pairs_[static_cast<std::size_t>(std::int64_t{j} * m_.terms)],
                         rows_.size(),
                         0,
                         count_,

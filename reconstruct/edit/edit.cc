@@ -56,7 +56,7 @@ class EditedRows {
           continue;
         }
         const RdSlice& theirs = rows_.at(to_j)[static_cast<std::size_t>(to_i)];
-        const auto there = static_cast<std::size_t>(v * header_.core + u);
+        const auto there = static_cast<std::size_t>(std::int64_t{v} * header_.core + u);
         const std::size_t back = size - 1 - there;
         for (std::size_t c = 0; c < header_.channels.size(); ++c) {
           float& value = slice.rd[c * size + there];

@@ -65,7 +65,7 @@ class LogProfile {
 
  private:
   double At(int u, int v) const {
-    return log_[static_cast<std::size_t>(v * core_ + u)];
+    return log_[static_cast<std::size_t>(std::int64_t{v} * core_ + u)];
   }
   int core_;
   int radius_;
@@ -89,7 +89,7 @@ Profile FilledProfile(const RdHeader& header, const RdSlice& slice, int channel)
   std::vector<int> count(sum.size());
   for (int v = 0; v < header.core; ++v) {
     for (int u = 0; u < header.core; ++u) {
-      const auto k = static_cast<std::size_t>(v * header.core + u);
+      const auto k = static_cast<std::size_t>(std::int64_t{v} * header.core + u);
       if (good(k)) {
         const std::size_t ring = RingOf(header, u, v);
         sum[ring] += static_cast<double>(profile[k]);
@@ -104,7 +104,7 @@ Profile FilledProfile(const RdHeader& header, const RdSlice& slice, int channel)
   }
   for (int v = 0; v < header.core; ++v) {
     for (int u = 0; u < header.core; ++u) {
-      const auto k = static_cast<std::size_t>(v * header.core + u);
+      const auto k = static_cast<std::size_t>(std::int64_t{v} * header.core + u);
       if (!good(k)) {
         profile[k] = mean[RingOf(header, u, v)];
       }
@@ -122,11 +122,13 @@ Profile Stretched(const RdHeader& header, const Profile& profile, double range) 
     for (int u = 0; u < header.core; ++u) {
       double sum = 0;
       for (int k = 0; k < kPlaces * kPlaces; ++k) {
-        const double x = u - radius + (k % kPlaces + 0.5) / kPlaces - 0.5;
-        const double y = v - radius + (k / kPlaces + 0.5) / kPlaces - 0.5;
+        const int across = k % kPlaces;
+        const int down = k / kPlaces;
+        const double x = u - radius + (across + 0.5) / kPlaces - 0.5;
+        const double y = v - radius + (down + 0.5) / kPlaces - 0.5;
         sum += std::exp(log(x / range, y / range));
       }
-      stretched[static_cast<std::size_t>(v * header.core + u)] =
+      stretched[static_cast<std::size_t>(std::int64_t{v} * header.core + u)] =
           static_cast<float>(sum / (kPlaces * kPlaces));
     }
   }

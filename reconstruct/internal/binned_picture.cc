@@ -23,7 +23,7 @@ void Halve(const float* in, int width, int height, BinnedPicture& out) {
   for (int y = 0; y < out.height; ++y) {
     const float* upper = in + static_cast<std::size_t>(2 * y) * w;
     const float* lower = 2 * y + 1 < height ? upper + w : nothing.data();
-    float* row = &out.values[static_cast<std::size_t>(y * out.width)];
+    float* row = &out.values[static_cast<std::size_t>(std::int64_t{y} * out.width)];
     AddPairs(upper, lower, w / 2, row);
     if (w % 2 != 0) {
       row[w / 2] = upper[w - 1] + lower[w - 1];
@@ -138,21 +138,23 @@ BinnedPicture WithRim(const BinnedPicture& picture) {
   BinnedPicture padded = BinnedPicture::OfSize(picture.width + 2 * kDarkRim,
                                                picture.height + 2 * kDarkRim);
   for (int y = 0; y < picture.height; ++y) {
-    std::copy_n(&picture.values[static_cast<std::size_t>(y * picture.width)],
-                picture.width,
-                &padded.values[static_cast<std::size_t>((y + kDarkRim) * padded.width +
-                                                        kDarkRim)]);
+    std::copy_n(
+        &picture.values[static_cast<std::size_t>(std::int64_t{y} * picture.width)],
+        picture.width,
+        &padded.values[static_cast<std::size_t>(
+            std::int64_t{y + kDarkRim} * padded.width + kDarkRim)]);
   }
   return padded;
 }
 
 void AddWithoutRim(const BinnedPicture& padded, BinnedPicture& picture) {
   for (int y = 0; y < picture.height; ++y) {
-    AddScaled(&padded.values[static_cast<std::size_t>((y + kDarkRim) * padded.width +
-                                                      kDarkRim)],
-              1,
-              static_cast<std::size_t>(picture.width),
-              &picture.values[static_cast<std::size_t>(y * picture.width)]);
+    AddScaled(
+        &padded.values[static_cast<std::size_t>(
+            std::int64_t{y + kDarkRim} * padded.width + kDarkRim)],
+        1,
+        static_cast<std::size_t>(picture.width),
+        &picture.values[static_cast<std::size_t>(std::int64_t{y} * picture.width)]);
   }
 }
 

@@ -102,9 +102,9 @@ class CellWeights::BoxBuilder {
         bin_row = row / BinnedPicture::kSide;
         bin_left = left / BinnedPicture::kSide;
         const int right = left + static_cast<int>(weights.size()) - 1;
-        binned.assign(
-            static_cast<std::size_t>(right / BinnedPicture::kSide - bin_left + 1),
-            0.0F);
+        binned.assign(static_cast<std::size_t>(
+                          std::int64_t{right / BinnedPicture::kSide} - bin_left + 1),
+                      0.0F);
       }
       for (std::size_t x = 0; x < weights.size(); ++x) {
         const int bin = (left + static_cast<int>(x)) / BinnedPicture::kSide - bin_left;

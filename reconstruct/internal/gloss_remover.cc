@@ -72,8 +72,8 @@ std::array<double, GlossRemover::kSide * GlossRemover::kSide> GlossRemover::Resp
       if (column < 0 || row < 0 || column >= lattice.columns || row >= lattice.rows) {
         continue;
       }
-      double& mean =
-          response[static_cast<std::size_t>((v + kReach) * kSide + u + kReach)];
+      double& mean = response[static_cast<std::size_t>(
+          std::int64_t{v + kReach} * kSide + u + kReach)];
       mean = weights.Mean(frame, lattice.Index(column, row)).mean;
       sum += mean * header_.CellAreaMm2();
     }
@@ -116,8 +116,8 @@ void GlossRemover::Remove(std::int64_t s, RdSlice& slice) const {
           continue;
         }
         const double share =
-            rd_per_light *
-            response[static_cast<std::size_t>((v + kReach) * kSide + u + kReach)];
+            rd_per_light * response[static_cast<std::size_t>(
+                               std::int64_t{v + kReach} * kSide + u + kReach)];
         slice.rd[at] -=
             is_found ? static_cast<float>(gloss_.reflectance[c] * share) : 0.0F;
         slice.sigma[at] =

@@ -19,7 +19,8 @@ std::vector<std::vector<std::int64_t>> FindPictures(
     const acquire::ScheduledPicture& picture = schedule[number];
     if (picture.target == acquire::Target::kSample && picture.group >= 0 &&
         picture.channel >= 0) {
-      pictures[static_cast<std::size_t>(picture.group * channels + picture.channel)]
+      pictures[static_cast<std::size_t>(std::int64_t{picture.group} * channels +
+                                        picture.channel)]
           .push_back(number);
     }
   }
@@ -100,8 +101,8 @@ GroupReader::GroupReader(const acquire::SessionReader& session,
 }
 
 const std::vector<std::int64_t>& GroupReader::Pictures(int group, int channel) const {
-  return pictures_[static_cast<std::size_t>(group * session_.rig().ChannelCount() +
-                                            channel)];
+  return pictures_[static_cast<std::size_t>(
+      std::int64_t{group} * session_.rig().ChannelCount() + channel)];
 }
 
 void GroupReader::AddPictures(int group, std::vector<std::int64_t>& numbers) const {

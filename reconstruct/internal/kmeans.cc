@@ -124,7 +124,8 @@ class Lloyd {
   }
 
   void Add(std::int64_t n, int cluster, double sign) {
-    double* sum = &sums_[static_cast<std::size_t>(cluster * points_.dimensions)];
+    double* sum =
+        &sums_[static_cast<std::size_t>(std::int64_t{cluster} * points_.dimensions)];
     const float* row = points_.Row(n);
     for (int d = 0; d < points_.dimensions; ++d) {
       sum[d] += sign * static_cast<double>(row[d]);
@@ -141,6 +142,7 @@ class Lloyd {
     std::vector<Nearest> found(all.size());
     nearest.Find(rows, all, found);
     std::vector<float> half;
+    half.reserve(found.size());
     for (const Nearest& own : found) {
       half.push_back(0.5F * std::sqrt(own.second_distance2) * (1 - kSlack));
     }
@@ -179,7 +181,8 @@ class Lloyd {
   void Finish() {
     for (std::int64_t n = 0; n < points_.count; ++n) {
       const double* centre = &centres_[static_cast<std::size_t>(
-          result_.labels[static_cast<std::size_t>(n)] * points_.dimensions)];
+          std::int64_t{result_.labels[static_cast<std::size_t>(n)]} *
+          points_.dimensions)];
       const float* row = points_.Row(n);
       for (int d = 0; d < points_.dimensions; ++d) {
         const double difference = static_cast<double>(row[d]) - centre[d];

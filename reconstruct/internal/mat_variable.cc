@@ -72,7 +72,8 @@ Version CheckWhole(const std::filesystem::path& path) {
         ": isn't a MATLAB file of version 5 or 7.3; save it with -v7 or -v7.3");
   }
   const bool big_endian = text.ends_with("MI");
-  const int major = text[big_endian ? 124 : 125];  // 1: version 5, 2: HDF5
+  const int major = static_cast<unsigned char>(
+      text[big_endian ? 124 : 125]);  // 1: version 5, 2: HDF5
   std::array<char, 8> beyond{};
   file.seekg(512);
   file.read(beyond.data(), beyond.size());

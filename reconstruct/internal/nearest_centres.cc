@@ -66,12 +66,14 @@ NearestCentres::NearestCentres(const std::vector<double>& centres,
                                int dimensions)
     : count_(count), dimensions_(dimensions) {
   const int groups = (count + kLanes - 1) / kLanes;
-  columns_.assign(static_cast<std::size_t>(groups * dimensions * kLanes), kNowhere);
+  columns_.assign(static_cast<std::size_t>(std::int64_t{groups} * dimensions * kLanes),
+                  kNowhere);
   for (int c = 0; c < count; ++c) {
     for (int d = 0; d < dimensions; ++d) {
-      columns_[static_cast<std::size_t>((c / kLanes * dimensions + d) * kLanes +
-                                        c % kLanes)] =
-          static_cast<float>(centres[static_cast<std::size_t>(c * dimensions + d)]);
+      columns_[static_cast<std::size_t>(
+          (std::int64_t{c / kLanes} * dimensions + d) * kLanes + c % kLanes)] =
+          static_cast<float>(
+              centres[static_cast<std::size_t>(std::int64_t{c} * dimensions + d)]);
     }
   }
 }
@@ -96,7 +98,7 @@ void NearestCentres::Find(const PointSet& points,
                           std::span<const std::int64_t> which,
                           std::span<Nearest> found) const {
   const int groups = (count_ + kLanes - 1) / kLanes;
-  const auto stride = static_cast<std::size_t>(groups * kLanes);
+  const auto stride = static_cast<std::size_t>(std::int64_t{groups} * kLanes);
   std::vector<float> distance2(kPointsAtOnce * stride);
   for (std::size_t first = 0; first < which.size(); first += kPointsAtOnce) {
     const std::size_t count =
@@ -110,10 +112,11 @@ void NearestCentres::Find(const PointSet& points,
       for (std::size_t n = 0; n < kPointsAtOnce; ++n) {
         out[n] = &distance2[n * stride + static_cast<std::size_t>(g * kLanes)];
       }
-      Distances2(rows,
-                 &columns_[static_cast<std::size_t>(g * dimensions_ * kLanes)],
-                 dimensions_,
-                 out);
+      Distances2(
+          rows,
+          &columns_[static_cast<std::size_t>(std::int64_t{g} * dimensions_ * kLanes)],
+          dimensions_,
+          out);
     }
     for (std::size_t n = 0; n < count; ++n) {
       found[first + n] = NearestOf(

@@ -14,7 +14,7 @@ std::vector<float> Subsample(const std::vector<float>& all,
   some.reserve(all.size() / static_cast<std::size_t>(plane.step * plane.step) + 1);
   for (int y = plane.row; y < height_px; y += plane.step) {
     for (int x = plane.column; x < width_px; x += plane.step) {
-      some.push_back(all[static_cast<std::size_t>(y * width_px + x)]);
+      some.push_back(all[static_cast<std::size_t>(std::int64_t{y} * width_px + x)]);
     }
   }
   return some;

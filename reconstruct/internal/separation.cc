@@ -215,7 +215,7 @@ RdSlice Separation::Slice(std::int64_t s, double* share) const {
   const int core = header_.core;
   std::vector<Foreign> nodes(static_cast<std::size_t>(core * core));
   const auto node = [&](int u, int v) -> Foreign& {
-    return nodes[static_cast<std::size_t>(v * core + u)];
+    return nodes[static_cast<std::size_t>(std::int64_t{v} * core + u)];
   };
   const Others others = has_tails_ ? OthersOf(s) : Others{};
   std::size_t at = 0;

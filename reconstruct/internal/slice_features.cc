@@ -41,7 +41,8 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumn
 }
 
 std::size_t Stride(int dimensions) {
-  return static_cast<std::size_t>((dimensions + kLanes - 1) / kLanes * kLanes);
+  return static_cast<std::size_t>(std::int64_t{(dimensions + kLanes - 1) / kLanes} *
+                                  kLanes);
 }
 
 // The largest valid value, 0 if there is none above it.

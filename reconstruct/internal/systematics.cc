@@ -18,7 +18,8 @@ struct Window {
     const int after = place + 1 < core ? at + step : at;
     const float low = rd[static_cast<std::size_t>(before)];
     const float high = rd[static_cast<std::size_t>(after)];
-    const auto cells = static_cast<float>((after - before) / step);
+    const auto steps = (after - before) / step;
+    const auto cells = static_cast<float>(steps);
     return low > 0 && high > 0 && cells > 0 ? std::log(high / low) / cells : 0.0F;
   }
 };

@@ -78,8 +78,8 @@ class TailMap {
   }
   Tail FitSector(const RdSlice& slice, int channel, int sector, double outer_mm) const;
   const Way& WayTo(int du, int dv) const {
-    return ways_[static_cast<std::size_t>((dv + reach_) * (2 * reach_ + 1) + du +
-                                          reach_)];
+    return ways_[static_cast<std::size_t>(std::int64_t{dv + reach_} * (2 * reach_ + 1) +
+                                          du + reach_)];
   }
 
   RdHeader header_;

@@ -105,7 +105,7 @@ class WindowShift::EdgeBuilder {
              std::min(box.top, std::max(0, y - 1)),
              std::max(box.bottom, std::min(camera_.height_px - 1, y + 2))};
     }
-    const auto width = static_cast<std::size_t>(box.right - box.left + 1);
+    const auto width = static_cast<std::size_t>(std::int64_t{box.right} - box.left + 1);
     weights_.assign(width * static_cast<std::size_t>(box.bottom - box.top + 1), 0.0F);
     for (const calibrate::PixelPoint at : points) {
       AddPoint(at, box);
@@ -145,7 +145,8 @@ class WindowShift::EdgeBuilder {
         const auto add = [&](int column, int row, double part) {
           const int c = std::clamp(column, box.left, box.right) - box.left;
           const int r = std::clamp(row, box.top, box.bottom) - box.top;
-          weights_[static_cast<std::size_t>(r * (box.right - box.left + 1) + c)] +=
+          weights_[static_cast<std::size_t>(
+              std::int64_t{r} * (box.right - box.left + 1) + c)] +=
               static_cast<float>(part);
         };
         add(x + dx, y + dy, weight * (1 + 4 * blur_px2_));

@@ -85,7 +85,7 @@ std::string Document::RequiredAttribute(const pugi::xml_node& node,
 
 std::filesystem::path Document::File(const pugi::xml_node& node,
                                      const std::string& name) {
-  const std::filesystem::path path = folder / name;
+  std::filesystem::path path = folder / name;
   CheckAllowed(node, path);
   std::error_code none;
   if (!std::filesystem::is_regular_file(path, none)) {

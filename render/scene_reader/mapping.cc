@@ -63,6 +63,7 @@ SampleOnSurface ReadMapping(Element& element, const Shape& shape, float mm_per_u
       known.begin(), known.end(), [&](const auto& k) { return k.first == name; });
   if (found == known.end()) {
     std::vector<std::string> names;
+    names.reserve(known.size());
     for (const auto& k : known) {
       names.push_back(k.first);
     }

@@ -59,6 +59,7 @@ Object FindById(const Document& document,
   const auto found = objects.find(id);
   if (found == objects.end()) {
     std::vector<std::string> known;
+    known.reserve(objects.size());
     for (const auto& object : objects) {
       known.push_back(object.first);
     }

@@ -14,6 +14,7 @@ Value Choose(Element& element,
   const auto found = values.find(word);
   if (found == values.end()) {
     std::vector<std::string> known;
+    known.reserve(values.size());
     for (const auto& entry : values) {
       known.push_back(entry.first);
     }

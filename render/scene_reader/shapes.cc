@@ -192,7 +192,7 @@ std::optional<Shape> MakeShape(Element element) {
   return shape;
 }
 
-void ReadShape(Element element) {
+void ReadShape(const Element& element) {
   if (element.type() == "shapegroup") {
     ReadShapeGroup(element);
   } else if (element.type() == "instance") {

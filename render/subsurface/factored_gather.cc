@@ -252,7 +252,7 @@ class FactoredGather final : public Subsurface {
 
 class Factored final : public SubsurfaceModel {
  public:
-  Factored(std::shared_ptr<const WindowSource> source,
+  Factored(const std::shared_ptr<const WindowSource>& source,
            const FactoredOptions& options,
            const SampleOnSurface& mapping)
       : windows_(std::make_shared<MaterialWindows>(source, options.window_cache_mb)),
@@ -302,11 +302,12 @@ class Factored final : public SubsurfaceModel {
       double sum = 0;
       for (int n = 0; n < kPlaces * kPlaces * kDirections; ++n) {
         const int place = n / kDirections;
-        const int window =
-            windows_
-                ->EntryAt({(static_cast<float>(place % kPlaces) + 0.5F) / kPlaces,
-                           (static_cast<float>(place / kPlaces) + 0.5F) / kPlaces})
-                .window;
+        const int column = place % kPlaces;
+        const int row = place / kPlaces;
+        const int window = windows_
+                               ->EntryAt({(static_cast<float>(column) + 0.5F) / kPlaces,
+                                          (static_cast<float>(row) + 0.5F) / kPlaces})
+                               .window;
         const float angle = 2 * std::numbers::pi_v<float> *
                             static_cast<float>(n % kDirections) / kDirections;
         const ColorLanes rd =

@@ -42,7 +42,7 @@ std::uint64_t DominantSide(Vec3 n) {
   const float ay = std::abs(n.y);
   const float az = std::abs(n.z);
   const int axis = ax >= ay && ax >= az ? 0 : ay >= az ? 1 : 2;
-  return static_cast<std::uint64_t>(2 * axis + (n[axis] < 0 ? 1 : 0));
+  return static_cast<std::uint64_t>(2 * std::int64_t{axis} + (n[axis] < 0 ? 1 : 0));
 }
 
 std::array<std::int64_t, 3> VoxelOf(Vec3 p, float side_mm) {

@@ -249,7 +249,7 @@ std::unique_ptr<MaterialWindows::Cell[]> MaterialWindows::Evaluate(int window) c
   std::vector<ColorLanes> q = Means(window);
   std::vector<WindowProfile::Moments> moments(q.size());
   const auto index = [&](int u, int v) {
-    return static_cast<std::size_t>(v * core + u);
+    return static_cast<std::size_t>(std::int64_t{v} * core + u);
   };
   for (int v = 0; v < core; ++v) {
     for (int u = 0; u < core; ++u) {

@@ -31,8 +31,10 @@ void ForEachProfile(const TexturedMedium& medium, int places, Visitor&& visit) {
   before.fill({-1.0F, -1.0F});
   for (int n = 0; n < places * places; ++n) {
     const float side = static_cast<float>(places);
-    const Vec2 uv{(static_cast<float>(n % places) + 0.5F) / side,
-                  (static_cast<float>(n / places) + 0.5F) / side};
+    const int column = n % places;
+    const int row = n / places;
+    const Vec2 uv{(static_cast<float>(column) + 0.5F) / side,
+                  (static_cast<float>(row) + 0.5F) / side};
     const Color first = medium.first->At(uv);
     const Color second = medium.second->At(uv);
     for (int c = 0; c < 3; ++c) {

@@ -140,7 +140,9 @@ WindowProfile::Moments WindowProfile::OfCell(int column, int row) const {
   const int rules = RulesAlong(column, row);
   const auto place = [&](int k) {
     const float half = (k % 2 == 0 ? -0.5F : 0.5F) / std::numbers::sqrt3_v<float>;
-    return (static_cast<float>(k / 2) + 0.5F + half) / static_cast<float>(rules) - 0.5F;
+    const int interval = k / 2;
+    return (static_cast<float>(interval) + 0.5F + half) / static_cast<float>(rules) -
+           0.5F;
   };
   const auto centre_x = static_cast<float>(column);
   const auto centre_y = static_cast<float>(row);

@@ -70,8 +70,8 @@ factor::Material WithinError(const factor::Material& channel, double error) {
   for (int j = 0; j < channel.points_y; ++j) {
     for (int i = 0; i < channel.points_x; ++i) {
       const int middle = channel.core / 2;
-      const auto scale = static_cast<double>(
-          channel.row_scale[static_cast<std::size_t>(j * channel.points_x + i)]);
+      const auto scale = static_cast<double>(channel.row_scale[static_cast<std::size_t>(
+          std::int64_t{j} * channel.points_x + i)]);
       const auto peak = static_cast<double>(channel.Evaluate(0, i, j, middle, middle));
       largest = std::max(largest, scale > 0 ? peak / scale : 0);
     }
@@ -131,7 +131,7 @@ class MaterialFileSource final : public WindowSource {
     return Of(channel).Evaluate(0, i, j, u, v);
   }
   float Albedo(int channel, int i, int j) const override {
-    return Of(channel).albedo[static_cast<std::size_t>(j * points_x + i)];
+    return Of(channel).albedo[static_cast<std::size_t>(std::int64_t{j} * points_x + i)];
   }
   int channels_read() const override { return file_.channels_read(); }
   int terms_used() const override { return terms_used_.load(); }
@@ -184,7 +184,7 @@ class DatasetSource final : public WindowSource {
     std::copy(values, values + size, window);
   }
   float Evaluate(int channel, int i, int j, int u, int v) const override {
-    const auto cell = static_cast<std::size_t>(v * core + u);
+    const auto cell = static_cast<std::size_t>(std::int64_t{v} * core + u);
     return Slice(i, j)[static_cast<std::size_t>(channel) * WindowSize() + cell];
   }
   float Albedo(int channel, int i, int j) const override {
@@ -203,7 +203,7 @@ class DatasetSource final : public WindowSource {
 
   /// The windows of all channels, then their albedos.
   const std::vector<float>& Slice(int i, int j) const {
-    auto& slot = slices_[static_cast<std::size_t>(j * points_x + i)];
+    auto& slot = slices_[static_cast<std::size_t>(std::int64_t{j} * points_x + i)];
     if (const auto* known = slot.load(std::memory_order_acquire)) {
       return *known;
     }

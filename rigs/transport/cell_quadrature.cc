@@ -124,7 +124,8 @@ CellQuadrature MakeCellQuadrature(
     for (int u = -radius; u <= radius; ++u) {
       const int column = std::max(std::abs(u), std::abs(v));
       const int row = std::min(std::abs(u), std::abs(v));
-      const auto rule = static_cast<std::size_t>(column * (column + 1) / 2 + row);
+      const auto rule =
+          static_cast<std::size_t>(std::int64_t{column} * (column + 1) / 2 + row);
       for (const Node& node : rules[rule]) {
         const double x = std::abs(u) >= std::abs(v) ? node.x : node.y;
         const double y = std::abs(u) >= std::abs(v) ? node.y : node.x;

@@ -32,6 +32,7 @@ struct Lookup {
   float fraction_sign;
 };
 
+// NOLINTNEXTLINE(readability-function-size): plain arrays are what becomes vectors
 NACRE_SIMD_CLONES void AddValues(const Lookup& table,
                                  const float* __restrict dx,
                                  const float* __restrict dy,

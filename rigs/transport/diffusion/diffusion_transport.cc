@@ -158,7 +158,8 @@ std::size_t DiffusionTransport::Impl::CentreColumn(const Channel& channel,
     const int from_first = static_cast<int>(std::lround(offset_mm / pitch_mm));
     return from_first * channel.refine + (core * channel.refine - 1) / 2 + scene.margin;
   };
-  return static_cast<std::size_t>(cells(x_i.y - place.first.y) * scene.nx +
+  return static_cast<std::size_t>(std::int64_t{cells(x_i.y - place.first.y)} *
+                                      scene.nx +
                                   cells(x_i.x - place.first.x));
 }
 
@@ -284,6 +285,7 @@ void DiffusionTransport::SolveWindows(
   const std::vector<Neighbourhood> places =
       diffusion::GroupPoints(points, impl_->phantom.grid, LocalDomain<float>::kLanes);
   std::vector<std::vector<std::size_t>> units;
+  units.reserve(places.size());
   for (const Neighbourhood& place : places) {
     units.push_back(place.indices);
   }

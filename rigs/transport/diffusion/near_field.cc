@@ -44,8 +44,8 @@ NearField::NearField(const ChannelSetup& setup,
                 .count_y = count},
                &margin);
   const auto column = [&](int dx, int dy) {
-    return static_cast<std::size_t>((dy + wide + margin) * mesh.x.Count() + dx + wide +
-                                    margin);
+    return static_cast<std::size_t>(std::int64_t{dy + wide + margin} * mesh.x.Count() +
+                                    dx + wide + margin);
   };
   PatternFractions fractions = SampleFractions(Pattern{}, mesh);
   for (std::size_t m = 0; m < setup.substances.size(); ++m) {
@@ -63,8 +63,8 @@ NearField::NearField(const ChannelSetup& setup,
     for (int b = 0; b <= wide; ++b) {
       for (int a = b; a <= wide; ++a) {
         const double mean = profiles[m].CellMean(a * step, b * step, step);
-        pencil[static_cast<std::size_t>(b * (wide + 1) + a)] = mean;
-        pencil[static_cast<std::size_t>(a * (wide + 1) + b)] = mean;
+        pencil[static_cast<std::size_t>(std::int64_t{b} * (wide + 1) + a)] = mean;
+        pencil[static_cast<std::size_t>(std::int64_t{a} * (wide + 1) + b)] = mean;
       }
     }
     std::vector<double>& logs = logs_.emplace_back();
@@ -74,7 +74,9 @@ NearField::NearField(const ChannelSetup& setup,
         for (const auto& [at, weight] : columns) {
           const int a = std::abs(dx - at.first);
           const int b = std::abs(dy - at.second);
-          reference += weight * pencil[static_cast<std::size_t>(b * (wide + 1) + a)];
+          reference +=
+              weight *
+              pencil[static_cast<std::size_t>(std::int64_t{b} * (wide + 1) + a)];
         }
         logs.push_back(std::log(reference / domain.Exitance(0, column(dx, dy))));
       }

@@ -28,7 +28,8 @@ class NearField {
   /// log of the factor of that substance, at a column (dx, dy) from the beam's.
   double LogFactor(std::size_t substance, int dx, int dy) const {
     const int side = 2 * half_ + 1;
-    return logs_[substance][static_cast<std::size_t>((dy + half_) * side + dx + half_)];
+    return logs_[substance][static_cast<std::size_t>(std::int64_t{dy + half_} * side +
+                                                     dx + half_)];
   }
 
  private:

@@ -98,8 +98,9 @@ SlabOperator Coarsen(const SlabOperator& fine) {
   }
   for (int j = 0; j < fine.ny; ++j) {
     for (int i = 0; i < fine.nx; ++i) {
-      const std::size_t f = static_cast<std::size_t>(j * fine.nx + i);
-      const std::size_t c = static_cast<std::size_t>((j / 2) * coarse.nx + i / 2);
+      const std::size_t f = static_cast<std::size_t>(std::int64_t{j} * fine.nx + i);
+      const std::size_t c =
+          static_cast<std::size_t>(std::int64_t{j / 2} * coarse.nx + i / 2);
       coarse.area_mm2[c] += fine.area_mm2[f];
       coarse.absorption[c] += fine.absorption[f];
       coarse.side[c] += fine.side[f];

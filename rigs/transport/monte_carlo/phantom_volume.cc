@@ -32,6 +32,7 @@ Optics Mix(const Optics& first, const Optics& second, double second_fraction) {
 std::vector<Optics> Mixtures(const std::vector<Blend>& palette,
                              const std::vector<Optics>& media) {
   std::vector<Optics> mixtures;
+  mixtures.reserve(palette.size());
   for (const Blend& blend : palette) {
     mixtures.push_back(
         Mix(media[blend.first], media[blend.second], blend.second_fraction));

@@ -238,6 +238,7 @@ template <class Real>
 }
 
 template <class Real>
+// NOLINTNEXTLINE(readability-function-size): vectors of one step
 [[gnu::always_inline]] inline void StepBody(const LevelView<Real>& level,
                                             const Lanes<Real>& a,
                                             const Lanes<Real>* p,

@@ -55,11 +55,11 @@ HWY_ATTR void MixPairs(U& a, U& b, U& c, U& d) {
 
 template <std::size_t kRound>
 HWY_ATTR void Mix(FourWords& x) {
-  constexpr std::array<int, 2> r = kThreefryRotations[kRound % 8];
+  constexpr std::array<int, 2> kTurns = kThreefryRotations[kRound % 8];
   if constexpr (kRound % 2 == 0) {
-    MixPairs<r[0], r[1]>(x.a, x.b, x.c, x.d);
+    MixPairs<kTurns[0], kTurns[1]>(x.a, x.b, x.c, x.d);
   } else {
-    MixPairs<r[0], r[1]>(x.a, x.d, x.c, x.b);
+    MixPairs<kTurns[0], kTurns[1]>(x.a, x.d, x.c, x.b);
   }
 }
 
@@ -69,12 +69,12 @@ HWY_ATTR void FourRounds(FourWords& x, const std::array<std::uint32_t, 5>& k) {
   Mix<kFirst + 1>(x);
   Mix<kFirst + 2>(x);
   Mix<kFirst + 3>(x);
-  constexpr std::uint32_t s = kFirst / 4 + 1;
+  constexpr std::uint32_t kStep = kFirst / 4 + 1;
   const Words32 du;
-  x.a = hn::Add(x.a, hn::Set(du, k[s % 5]));
-  x.b = hn::Add(x.b, hn::Set(du, k[(s + 1) % 5]));
-  x.c = hn::Add(x.c, hn::Set(du, k[(s + 2) % 5]));
-  x.d = hn::Add(x.d, hn::Set(du, k[(s + 3) % 5] + s));
+  x.a = hn::Add(x.a, hn::Set(du, k[kStep % 5]));
+  x.b = hn::Add(x.b, hn::Set(du, k[(kStep + 1) % 5]));
+  x.c = hn::Add(x.c, hn::Set(du, k[(kStep + 2) % 5]));
+  x.d = hn::Add(x.d, hn::Set(du, k[(kStep + 3) % 5] + kStep));
 }
 
 // Threefry<12>({photon, photon_high, step, 0}, key) in every lane; k is the key and its
