@@ -2,6 +2,7 @@
 
 #include "acquire/camera.h"
 
+#include <cstdint>
 #include <string>
 
 namespace nacre::acquire {

@@ -3,6 +3,7 @@
 #include "acquire/mosaic.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace nacre::calibrate {
 namespace {

@@ -12,6 +12,7 @@
 #endif
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 

@@ -4,6 +4,7 @@
 #include "factor/material_file.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace nacre::factor {
 namespace internal {

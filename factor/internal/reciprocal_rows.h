@@ -4,6 +4,7 @@
 #include "factor/internal/reciprocal_taps.h"
 #include "factor/internal/row_streams.h"
 
+#include <cstdint>
 #include <vector>
 
 namespace nacre::factor::internal {

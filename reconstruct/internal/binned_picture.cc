@@ -1,6 +1,7 @@
 #include "reconstruct/internal/binned_picture.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace nacre::reconstruct::internal {
 namespace {

@@ -1,5 +1,6 @@
 #include "reconstruct/internal/plane_reader.h"
 
+#include <cstdint>
 #include <utility>
 
 namespace nacre::reconstruct::internal {

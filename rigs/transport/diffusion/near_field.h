@@ -5,6 +5,7 @@
 #include "rigs/transport/diffusion/radial_profile.h"
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 namespace nacre::rigs::diffusion {

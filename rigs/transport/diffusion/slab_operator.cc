@@ -3,6 +3,7 @@
 #include "core/error.h"
 
 #include <cmath>
+#include <cstdint>
 
 namespace nacre::rigs::diffusion {
 namespace {
