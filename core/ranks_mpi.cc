@@ -15,7 +15,7 @@ namespace {
 
 // Messages go in pieces that MPI sends at once, see SetUpSharedMemory; one that is
 // shorter than this ends them.
-constexpr std::size_t kPiece = 60 * 1024;
+constexpr std::size_t kPiece = 30 * 1024;
 
 int WorldRank() {
   int rank = 0;
@@ -131,9 +131,10 @@ void SetUpSharedMemory() {
   set("OMPI_MCA_btl_vader_single_copy_mechanism", "none");
   // Of messages above 4 kB it sends the head, and the rest once the receiver has
   // answered and the sender, who computes meanwhile, looks: until then the receiver
-  // spins.
-  set("OMPI_MCA_btl_vader_eager_limit", "65536");
-  set("OMPI_MCA_btl_vader_max_send_size", "65536");
+  // spins. Here pieces go at once, as many as there is room for.
+  set("OMPI_MCA_btl_vader_eager_limit", "32768");
+  set("OMPI_MCA_btl_vader_max_send_size", "32768");
+  set("OMPI_MCA_btl_vader_segment_size", "33554432");
 }
 
 }  // namespace

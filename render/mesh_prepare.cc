@@ -121,8 +121,8 @@ struct Bounds {
   Vec3 low;
   Vec3 high;
   explicit Bounds(const std::vector<Vec3>& points) {
-    constexpr float kInfinity = std::numeric_limits<float>::infinity();
-    low = {kInfinity, kInfinity, kInfinity};
+    constexpr float kFarthest = std::numeric_limits<float>::infinity();
+    low = {kFarthest, kFarthest, kFarthest};
     high = -low;
     for (const Vec3 p : points) {
       low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};

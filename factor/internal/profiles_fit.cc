@@ -63,7 +63,7 @@ class ProfilesFit {
              static_cast<std::size_t>((p.y + radius_) * width_ + p.x + radius_)];
   }
 
-  double Profile(std::size_t channel, GridIndex p, const Values& a) {
+  double Profile(std::size_t channel, GridIndex p, const GaussianValues& a) {
     double sum = 0;
     for (Eigen::Index t = 0; t < terms_; ++t) {
       sum += static_cast<double>(W(channel, t, p, w_)) * a(t);
@@ -72,7 +72,10 @@ class ProfilesFit {
   }
 
   // √(P of the other end / P of the point itself), which both are scaled by together.
-  double Ratio(std::size_t channel, GridIndex self, GridIndex other, const Values& a) {
+  double Ratio(std::size_t channel,
+               GridIndex self,
+               GridIndex other,
+               const GaussianValues& a) {
     const double own = Profile(channel, self, a);
     const double there = Profile(channel, other, a);
     if (!(own > 0) || !(there > 0)) {

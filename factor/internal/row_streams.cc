@@ -1,94 +1,63 @@
+// Rows of numbers added up in registers, compiled once for each instruction set. No sum
+// is contracted and none depends on how many lanes there are: the bits are the same.
+// clang-format off: the order matters
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "factor/internal/row_streams.cc"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+// clang-format on
+
 #include "factor/internal/row_streams.h"
 
-#include <algorithm>
-#include <array>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <vector>
 
-#define NACRE_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-
+HWY_BEFORE_NAMESPACE();
 namespace nacre::factor::internal {
-namespace {
+namespace HWY_NAMESPACE {
 
-typedef float Lanes __attribute__((vector_size(64)));
-typedef float FewLanes __attribute__((vector_size(16)));
-typedef double Doubles __attribute__((vector_size(64)));
-constexpr std::size_t kWide = 16;
-constexpr std::size_t kFew = 4;
-constexpr std::size_t kDoubles = 8;
+namespace hn = hwy::HWY_NAMESPACE;
 
-// From and to any address: the compiler makes one move of it.
-[[gnu::always_inline]] inline void Get(const float* from, Lanes& to) {
-  std::memcpy(&to, from, sizeof(to));
-}
-[[gnu::always_inline]] inline void Get(const float* from, FewLanes& to) {
-  std::memcpy(&to, from, sizeof(to));
-}
-[[gnu::always_inline]] inline void Get(const double* from, Doubles& to) {
-  std::memcpy(&to, from, sizeof(to));
-}
-[[gnu::always_inline]] inline void Get(const float* from, float& to) {
-  to = *from;
-}
+using Floats = hn::ScalableTag<float>;
+using FewFloats = hn::CappedTag<float, 4>;
+constexpr std::size_t kWide = hn::MaxLanes(Floats());
+constexpr std::size_t kFew = hn::MaxLanes(FewFloats());
 
-// to += r · by
-#define NACRE_ADD_TO_SINK(Type, sink, r, i)          \
-  {                                                  \
-    Type sum;                                        \
-    Get((sink).to + (i), sum);                       \
-    if ((sink).by != nullptr) {                      \
-      Type by;                                       \
-      Get((sink).by + (i), by);                      \
-      sum += by * (r);                               \
-    } else {                                         \
-      sum += (sink).weight * (r);                    \
-    }                                                \
-    std::memcpy((sink).to + (i), &sum, sizeof(sum)); \
-  }
-
-}  // namespace
-
-NACRE_CLONES void LinearCombination(const float* const* rows,
-                                    const float* weights,
-                                    std::size_t count,
-                                    float first,
-                                    std::size_t n,
-                                    float* to) {
-  const Lanes none{};
-  Lanes v;
+HWY_ATTR void LinearCombination(const float* const* rows,
+                                const float* weights,
+                                std::size_t count,
+                                float first,
+                                std::size_t n,
+                                float* to) {
+  const Floats lanes;
   std::size_t i = 0;
   for (; i + 4 * kWide <= n; i += 4 * kWide) {
-    Lanes a = none + first;
-    Lanes b = a;
-    Lanes c = a;
-    Lanes d = a;
+    auto a = hn::Set(lanes, first);
+    auto b = a;
+    auto c = a;
+    auto d = a;
     for (std::size_t q = 0; q < count; ++q) {
       const float* row = rows[q] + i;
-      const float weight = weights[q];
-      Get(row, v);
-      a += weight * v;
-      Get(row + kWide, v);
-      b += weight * v;
-      Get(row + 2 * kWide, v);
-      c += weight * v;
-      Get(row + 3 * kWide, v);
-      d += weight * v;
+      const auto weight = hn::Set(lanes, weights[q]);
+      a = hn::Add(a, hn::Mul(weight, hn::LoadU(lanes, row)));
+      b = hn::Add(b, hn::Mul(weight, hn::LoadU(lanes, row + kWide)));
+      c = hn::Add(c, hn::Mul(weight, hn::LoadU(lanes, row + 2 * kWide)));
+      d = hn::Add(d, hn::Mul(weight, hn::LoadU(lanes, row + 3 * kWide)));
     }
-    std::memcpy(to + i, &a, sizeof(a));
-    std::memcpy(to + i + kWide, &b, sizeof(b));
-    std::memcpy(to + i + 2 * kWide, &c, sizeof(c));
-    std::memcpy(to + i + 3 * kWide, &d, sizeof(d));
+    hn::StoreU(a, lanes, to + i);
+    hn::StoreU(b, lanes, to + i + kWide);
+    hn::StoreU(c, lanes, to + i + 2 * kWide);
+    hn::StoreU(d, lanes, to + i + 3 * kWide);
   }
   for (; i < n && n >= kWide; i += kWide) {
-    i = std::min(i, n - kWide);  // some at the end once more
-    Lanes a = none + first;
+    i = i < n - kWide ? i : n - kWide;  // some at the end once more
+    auto a = hn::Set(lanes, first);
     for (std::size_t q = 0; q < count; ++q) {
-      Get(rows[q] + i, v);
-      a += weights[q] * v;
+      a = hn::Add(a,
+                  hn::Mul(hn::Set(lanes, weights[q]), hn::LoadU(lanes, rows[q] + i)));
     }
-    std::memcpy(to + i, &a, sizeof(a));
+    hn::StoreU(a, lanes, to + i);
   }
   for (; i < n; ++i) {
     float a = first;
@@ -99,23 +68,20 @@ NACRE_CLONES void LinearCombination(const float* const* rows,
   }
 }
 
-NACRE_CLONES void AddProducts(const float* const* a,
-                              const float* const* b,
-                              std::size_t count,
-                              std::size_t n,
-                              float* to) {
+HWY_ATTR void AddProducts(const float* const* a,
+                          const float* const* b,
+                          std::size_t count,
+                          std::size_t n,
+                          float* to) {
+  const Floats lanes;
   std::size_t i = 0;
   for (; i + kWide <= n; i += kWide) {
-    Lanes sum;
-    Lanes v;
-    Lanes w;
-    Get(to + i, sum);
+    auto sum = hn::LoadU(lanes, to + i);
     for (std::size_t q = 0; q < count; ++q) {
-      Get(a[q] + i, v);
-      Get(b[q] + i, w);
-      sum += v * w;
+      sum =
+          hn::Add(sum, hn::Mul(hn::LoadU(lanes, a[q] + i), hn::LoadU(lanes, b[q] + i)));
     }
-    std::memcpy(to + i, &sum, sizeof(sum));
+    hn::StoreU(sum, lanes, to + i);
   }
   for (; i < n; ++i) {
     for (std::size_t q = 0; q < count; ++q) {
@@ -124,43 +90,53 @@ NACRE_CLONES void AddProducts(const float* const* a,
   }
 }
 
-NACRE_CLONES void AddToSinks(const Sink* sinks,
-                             std::size_t count,
-                             const float* r,
-                             std::size_t n) {
+// to += r · by
+template <class Tag>
+HWY_ATTR void AddToSink(Tag lanes, const Sink& sink, hn::Vec<Tag> r, std::size_t i) {
+  const auto by =
+      sink.by != nullptr ? hn::LoadU(lanes, sink.by + i) : hn::Set(lanes, sink.weight);
+  hn::StoreU(
+      hn::Add(hn::LoadU(lanes, sink.to + i), hn::Mul(by, r)), lanes, sink.to + i);
+}
+
+HWY_ATTR void AddToSinks(const Sink* sinks,
+                         std::size_t count,
+                         const float* r,
+                         std::size_t n) {
+  const Floats lanes;
+  const FewFloats few;
   std::size_t i = 0;
   for (; i + 2 * kWide <= n; i += 2 * kWide) {
-    Lanes a;
-    Lanes b;
-    Get(r + i, a);
-    Get(r + i + kWide, b);
+    const auto a = hn::LoadU(lanes, r + i);
+    const auto b = hn::LoadU(lanes, r + i + kWide);
     for (std::size_t q = 0; q < count; ++q) {
-      NACRE_ADD_TO_SINK(Lanes, sinks[q], a, i)
-      NACRE_ADD_TO_SINK(Lanes, sinks[q], b, i + kWide)
+      AddToSink(lanes, sinks[q], a, i);
+      AddToSink(lanes, sinks[q], b, i + kWide);
     }
   }
   for (; i + kFew <= n; i += kFew) {
-    FewLanes a;
-    Get(r + i, a);
+    const auto a = hn::LoadU(few, r + i);
     for (std::size_t q = 0; q < count; ++q) {
-      NACRE_ADD_TO_SINK(FewLanes, sinks[q], a, i)
+      AddToSink(few, sinks[q], a, i);
     }
   }
   for (; i < n; ++i) {
     for (std::size_t q = 0; q < count; ++q) {
-      NACRE_ADD_TO_SINK(float, sinks[q], r[i], i)
+      const Sink& sink = sinks[q];
+      sink.to[i] += (sink.by != nullptr ? sink.by[i] : sink.weight) * r[i];
     }
   }
 }
 
 // exp x = 2^k exp r, k the nearest whole number to x / ln 2; a minimax polynomial of r.
-NACRE_CLONES void ExpRow(float most, std::size_t n, float* s) {
+HWY_ATTR void ExpRow(float most, std::size_t n, float* s) {
   constexpr float kLeast = -87;
   constexpr float kShift = 12582912;  // 1.5 · 2^23: added, it rounds
   constexpr float kHighLn2 = 0.693359375F;
   constexpr float kLowLn2 = -2.12194440e-4F;
   for (std::size_t i = 0; i < n; ++i) {
-    const float x = std::max(std::min(s[i], most), kLeast);
+    const float less = most < s[i] ? most : s[i];
+    const float x = less < kLeast ? kLeast : less;
     const float shifted = x * 1.44269504F + kShift;
     const float k = shifted - kShift;
     const float r = (x - k * kHighLn2) - k * kLowLn2;
@@ -179,54 +155,127 @@ NACRE_CLONES void ExpRow(float most, std::size_t n, float* s) {
   }
 }
 
-// A column with four others at a time.
-NACRE_CLONES void WeightedGram(const double* columns,
-                               const double* weight,
-                               std::size_t n,
-                               std::size_t count,
-                               double* gram) {
-  std::vector<double> weighted(n);
-  std::fill_n(gram, count * count, 0.0);
-  for (std::size_t b = 0; b < count; ++b) {
-    const double* column = columns + b * n;
-    for (std::size_t i = 0; i < n; ++i) {
-      weighted[i] = weight[i] * column[i];
+// Σ of eight sums, each over every eighth product, then of the rest: of one column,
+// `weighted`, with four others at a time.
+constexpr std::size_t kSums = 8;
+using Doubles = hn::CappedTag<double, kSums>;
+constexpr std::size_t kParts = kSums / hn::MaxLanes(Doubles());
+
+HWY_ATTR void FourProducts(const double* weighted,
+                           const double* const* others,
+                           std::size_t n,
+                           double* products) {
+  const Doubles lanes;
+  constexpr std::size_t kLanes = kSums / kParts;
+  hn::Vec<Doubles> sums[4][kParts];
+  for (auto& of_column : sums) {
+    for (auto& sum : of_column) {
+      sum = hn::Zero(lanes);
     }
-    for (std::size_t a = b; a < count; a += 4) {
-      // The last columns stand in for those beyond them.
-      std::array<const double*, 4> other{};
-      Doubles sums[4] = {};
+  }
+  std::size_t i = 0;
+  for (; i + kSums <= n; i += kSums) {
+    for (std::size_t part = 0; part < kParts; ++part) {
+      const std::size_t at = i + part * kLanes;
+      const auto w = hn::LoadU(lanes, weighted + at);
       for (std::size_t k = 0; k < 4; ++k) {
-        other[k] = columns + std::min(a + k, count - 1) * n;
-      }
-      std::size_t i = 0;
-      for (; i + kDoubles <= n; i += kDoubles) {
-        Doubles w;
-        Doubles v;
-        Get(&weighted[i], w);
-        for (std::size_t k = 0; k < 4; ++k) {
-          Get(other[k] + i, v);
-          sums[k] += w * v;
-        }
-      }
-      for (std::size_t k = 0; k < 4 && a + k < count; ++k) {
-        double sum = 0;
-        for (std::size_t lane = 0; lane < kDoubles; ++lane) {
-          sum += sums[k][lane];
-        }
-        for (std::size_t rest = i; rest < n; ++rest) {
-          sum += weighted[rest] * other[k][rest];
-        }
-        gram[b * count + a + k] = sum;
+        const auto product = hn::Mul(w, hn::LoadU(lanes, others[k] + at));
+        sums[k][part] = hn::Add(sums[k][part], product);
       }
     }
   }
+  for (std::size_t k = 0; k < 4; ++k) {
+    double each[kSums];
+    for (std::size_t part = 0; part < kParts; ++part) {
+      hn::StoreU(sums[k][part], lanes, each + part * kLanes);
+    }
+    double sum = 0;
+    for (const double one : each) {
+      sum += one;
+    }
+    for (std::size_t rest = i; rest < n; ++rest) {
+      sum += weighted[rest] * others[k][rest];
+    }
+    products[k] = sum;
+  }
 }
 
-NACRE_CLONES void AddToSums(const float* values, std::size_t n, double* sums) {
+HWY_ATTR void AddToSums(const float* values, std::size_t n, double* sums) {
   for (std::size_t i = 0; i < n; ++i) {
     sums[i] += static_cast<double>(values[i]);
   }
 }
 
+}  // namespace HWY_NAMESPACE
 }  // namespace nacre::factor::internal
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace nacre::factor::internal {
+
+HWY_EXPORT(LinearCombination);
+HWY_EXPORT(AddProducts);
+HWY_EXPORT(AddToSinks);
+HWY_EXPORT(ExpRow);
+HWY_EXPORT(FourProducts);
+HWY_EXPORT(AddToSums);
+
+void LinearCombination(const float* const* rows,
+                       const float* weights,
+                       std::size_t count,
+                       float first,
+                       std::size_t n,
+                       float* to) {
+  HWY_DYNAMIC_DISPATCH(LinearCombination)(rows, weights, count, first, n, to);
+}
+
+void AddProducts(const float* const* a,
+                 const float* const* b,
+                 std::size_t count,
+                 std::size_t n,
+                 float* to) {
+  HWY_DYNAMIC_DISPATCH(AddProducts)(a, b, count, n, to);
+}
+
+void AddToSinks(const Sink* sinks, std::size_t count, const float* r, std::size_t n) {
+  HWY_DYNAMIC_DISPATCH(AddToSinks)(sinks, count, r, n);
+}
+
+void ExpRow(float most, std::size_t n, float* s) {
+  HWY_DYNAMIC_DISPATCH(ExpRow)(most, n, s);
+}
+
+void WeightedGram(const double* columns,
+                  const double* weight,
+                  std::size_t n,
+                  std::size_t count,
+                  double* gram) {
+  std::vector<double> weighted(n);
+  for (std::size_t b = 0; b < count; ++b) {
+    const double* column = columns + b * n;
+    for (std::size_t i = 0; i < n; ++i) {
+      weighted[i] = weight[i] * column[i];
+    }
+    for (std::size_t a = 0; a < b; ++a) {
+      gram[b * count + a] = 0;
+    }
+    for (std::size_t a = b; a < count; a += 4) {
+      const double* others[4];
+      double products[4];
+      for (std::size_t k = 0; k < 4; ++k) {  // the last stands in for those beyond it
+        others[k] = columns + (a + k < count ? a + k : count - 1) * n;
+      }
+      HWY_DYNAMIC_DISPATCH(FourProducts)(weighted.data(), others, n, products);
+      for (std::size_t k = 0; k < 4 && a + k < count; ++k) {
+        gram[b * count + a + k] = products[k];
+      }
+    }
+  }
+}
+
+void AddToSums(const float* values, std::size_t n, double* sums) {
+  HWY_DYNAMIC_DISPATCH(AddToSums)(values, n, sums);
+}
+
+}  // namespace nacre::factor::internal
+#endif

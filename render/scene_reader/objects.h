@@ -37,7 +37,7 @@ std::optional<TexturedCoefficients> ReadTexturedCoefficients(Element& element);
 /// and σ_a, or σ_t and the albedo.
 Coefficients ReadCoefficients(Element& element);
 void ReadEmitter(Element element);
-void ReadShape(Element element);
+void ReadShape(const Element& element);
 /// A shape that isn't in the scene yet; none if its type isn't known.
 std::optional<Shape> MakeShape(Element element);
 /// The shape after a transform. Throws for a sphere that would be none.
