@@ -14,10 +14,11 @@ namespace nacre::reconstruct {
 
 /// What an array doesn't say about itself.
 struct ArrayImportOptions {
-  std::string axes;  ///< "" : "yxvuc", or "yxvu" of an array of four axes
+  std::string axes = {};  ///< "" : "yxvuc", or "yxvu" of an array of four axes
   bool bottom_first = false;
-  std::string channels;  ///< "" : R,G,B for three, else 0, 1, 2, …
-  std::string variable;  ///< of a .mat file; "" : the only array of four or five axes
+  std::string channels = {};  ///< "" : R,G,B for three, else 0, 1, 2, …
+  std::string variable =
+      {};  ///< of a .mat file; "" : the only array of four or five axes
 
   template <class Self, class Visitor>
   static void Visit(Self& self, Visitor&& visit) {
