@@ -20,9 +20,7 @@ namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 using Floats = hn::ScalableTag<float>;
-using FewFloats = hn::CappedTag<float, 4>;
 constexpr std::size_t kWide = hn::MaxLanes(Floats());
-constexpr std::size_t kFew = hn::MaxLanes(FewFloats());
 
 HWY_ATTR void LinearCombination(const float* const* rows,
                                 const float* weights,
@@ -90,41 +88,39 @@ HWY_ATTR void AddProducts(const float* const* a,
   }
 }
 
-// to += r · by
-template <class Tag>
-HWY_ATTR void AddToSink(Tag lanes, const Sink& sink, hn::Vec<Tag> r, std::size_t i) {
-  const auto by =
-      sink.by != nullptr ? hn::LoadU(lanes, sink.by + i) : hn::Set(lanes, sink.weight);
-  hn::StoreU(
-      hn::Add(hn::LoadU(lanes, sink.to + i), hn::Mul(by, r)), lanes, sink.to + i);
+// A block of `kBlock` values to each sink. Sinks overlap, so that the blocks decide on
+// the order of sums: they are the same for any number of lanes.
+template <std::size_t kBlock>
+HWY_ATTR void AddBlock(const Sink* sinks,
+                       std::size_t count,
+                       const float* r,
+                       std::size_t i) {
+  const hn::CappedTag<float, kBlock> lanes;
+  constexpr std::size_t kLanes = hn::MaxLanes(lanes);
+  for (std::size_t q = 0; q < count; ++q) {
+    const Sink& sink = sinks[q];
+    for (std::size_t at = i; at < i + kBlock; at += kLanes) {
+      const auto by = sink.by != nullptr ? hn::LoadU(lanes, sink.by + at)
+                                         : hn::Set(lanes, sink.weight);
+      const auto product = hn::Mul(by, hn::LoadU(lanes, r + at));
+      hn::StoreU(hn::Add(hn::LoadU(lanes, sink.to + at), product), lanes, sink.to + at);
+    }
+  }
 }
 
 HWY_ATTR void AddToSinks(const Sink* sinks,
                          std::size_t count,
                          const float* r,
                          std::size_t n) {
-  const Floats lanes;
-  const FewFloats few;
   std::size_t i = 0;
-  for (; i + 2 * kWide <= n; i += 2 * kWide) {
-    const auto a = hn::LoadU(lanes, r + i);
-    const auto b = hn::LoadU(lanes, r + i + kWide);
-    for (std::size_t q = 0; q < count; ++q) {
-      AddToSink(lanes, sinks[q], a, i);
-      AddToSink(lanes, sinks[q], b, i + kWide);
-    }
+  for (; i + 32 <= n; i += 32) {
+    AddBlock<32>(sinks, count, r, i);
   }
-  for (; i + kFew <= n; i += kFew) {
-    const auto a = hn::LoadU(few, r + i);
-    for (std::size_t q = 0; q < count; ++q) {
-      AddToSink(few, sinks[q], a, i);
-    }
+  for (; i + 4 <= n; i += 4) {
+    AddBlock<4>(sinks, count, r, i);
   }
   for (; i < n; ++i) {
-    for (std::size_t q = 0; q < count; ++q) {
-      const Sink& sink = sinks[q];
-      sink.to[i] += (sink.by != nullptr ? sink.by[i] : sink.weight) * r[i];
-    }
+    AddBlock<1>(sinks, count, r, i);
   }
 }
 
