@@ -63,7 +63,27 @@ void OnEachTarget(Check&& check) {
   hwy::SetSupportedTargetsForTest(0);
 }
 
-TEST(FactorOracles, RowStreamsAreThePlainLoopsToTheBit) {
+// What two sinks, the second of them one further, come to: blocks of 32 values, of 4
+// and of 1 decide on the order of sums.
+std::vector<float> InBlocks(const float* r,
+                            const float* first_by,
+                            const float* second_by,
+                            std::size_t n) {
+  std::vector<float> to(n + 1, 0.1F);
+  for (std::size_t i = 0; i < n;) {
+    const std::size_t block = i + 32 <= n ? 32 : i + 4 <= n ? 4 : 1;
+    for (std::size_t k = i; k < i + block; ++k) {
+      to[k] += first_by[k] * r[k];
+    }
+    for (std::size_t k = i; k < i + block; ++k) {
+      to[k + 1] += second_by[k] * r[k];
+    }
+    i += block;
+  }
+  return to;
+}
+
+void CheckRowStreams() {
   constexpr std::size_t kCount = 5;
   for (const std::size_t n : {1U, 3U, 15U, 16U, 17U, 63U, 64U, 65U, 130U, 1001U}) {
     std::vector<std::vector<float>> draws;
@@ -81,6 +101,10 @@ TEST(FactorOracles, RowStreamsAreThePlainLoopsToTheBit) {
     std::vector<float> weighted = sum;
     const Sink sinks[] = {{sunk.data(), rows[1], 0}, {weighted.data(), nullptr, 3e-5F}};
     AddToSinks(sinks, 2, rows[0], n);
+    std::vector<float> twice(n + 1, 0.1F);
+    const Sink overlapping[] = {{twice.data(), rows[1], 0}, {&twice[1], rows[2], 0}};
+    AddToSinks(overlapping, 2, rows[0], n);
+    ASSERT_EQ(twice, InBlocks(rows[0], rows[1], rows[2], n)) << n;
     std::vector<double> totals(n, 0.1);
     AddToSums(rows[0], n, totals.data());
     for (std::size_t i = 0; i < n; ++i) {
@@ -110,6 +134,10 @@ TEST(FactorOracles, RowStreamsAreThePlainLoopsToTheBit) {
       ASSERT_EQ(totals[i], 0.1 + static_cast<double>(rows[0][i]));
     }
   }
+}
+
+TEST(FactorOracles, RowStreamsAreThePlainLoopsToTheBit) {
+  OnEachTarget([](bool) { CheckRowStreams(); });
 }
 
 // x − k ln 2 is off by u (the product with the low part of ln 2 and the difference,
