@@ -4,14 +4,18 @@
 #include "core/version.h"
 
 #include <csignal>
+#include <utility>
 
 #include "python/bindings.h"
 
 namespace nacre::python {
 namespace {
 
+// A signal handler's, and what it stands for meanwhile.
+// NOLINTBEGIN(cppcoreguidelines-avoid-non-const-global-variables)
 volatile std::sig_atomic_t interrupted = 0;
 struct sigaction before {};
+// NOLINTEND(cppcoreguidelines-avoid-non-const-global-variables)
 
 extern "C" void OnInterrupt(int signal) {
   interrupted = 1;
@@ -91,6 +95,7 @@ struct ErrorTypes {
   PyObject* bad_data = nullptr;
   PyObject* interrupted = nullptr;
 };
+// NOLINTNEXTLINE(cppcoreguidelines-avoid-non-const-global-variables): the interpreter's
 ErrorTypes error_types;
 
 void AddErrors(py::module_& module) {
@@ -112,7 +117,7 @@ void AddErrors(py::module_& module) {
       module, "Interrupted", "`progress` returned False.", py::make_tuple(base));
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
-      std::rethrow_exception(thrown);
+      std::rethrow_exception(std::move(thrown));
     } catch (const Error& error) {
       PyObject* const type = error.code() == ExitCode::kUsage     ? error_types.usage
                              : error.code() == ExitCode::kBadData ? error_types.bad_data

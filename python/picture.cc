@@ -110,6 +110,7 @@ void AddImage(py::module_& module) {
       py::arg("path"));
 }
 
+// NOLINTNEXTLINE(readability-function-size): arguments that Python names
 py::tuple Render(const std::filesystem::path& scene_file,
                  const std::map<std::string, std::string>& define,
                  bool lenient,

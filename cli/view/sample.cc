@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <mutex>
 #include <numeric>
 
@@ -91,6 +92,26 @@ double ShareInside(double away, double radius) {
   return std::clamp(radius - away + 0.5, 0.0, 1.0);
 }
 
+// A window around a grid point, times `weight`, onto the grid.
+void AddWindow(const reconstruct::RdHeader& header,
+               int centre_i,
+               int centre_j,
+               const float* window,
+               float weight,
+               std::vector<float>& exitance) {
+  const int reach = header.Radius();
+  for (int v = 0; v < header.core; ++v) {
+    for (int u = 0; u < header.core; ++u) {
+      const int i = centre_i + u - reach;
+      const int j = centre_j + v - reach;
+      if (i >= 0 && i < header.points_x && j >= 0 && j < header.points_y) {
+        exitance[static_cast<std::size_t>(std::int64_t{j} * header.points_x + i)] +=
+            weight * window[v * header.core + u];
+      }
+    }
+  }
+}
+
 }  // namespace
 
 float Sample::LargestAlbedo() const {
@@ -122,7 +143,6 @@ std::vector<std::vector<float>> LightDisc(const Sample& sample,
   std::vector<std::vector<float>> exitance(
       header.channels.size(),
       std::vector<float>(static_cast<std::size_t>(header.PointCount())));
-  const int reach = header.Radius();
   for (int j = 0; j < header.points_y; ++j) {
     for (int i = 0; i < header.points_x; ++i) {
       const PointMm point = header.GridPoint(i, j);
@@ -137,17 +157,7 @@ std::vector<std::vector<float>> LightDisc(const Sample& sample,
       for (std::size_t c = 0; c < exitance.size(); ++c) {
         const float* window =
             &slice.rd[c * static_cast<std::size_t>(header.WindowSize())];
-        for (int v = 0; v < header.core; ++v) {
-          for (int u = 0; u < header.core; ++u) {
-            const int to_i = i + u - reach;
-            const int to_j = j + v - reach;
-            if (to_i >= 0 && to_i < header.points_x && to_j >= 0 &&
-                to_j < header.points_y) {
-              exitance[c][static_cast<std::size_t>(to_j * header.points_x + to_i)] +=
-                  weight * window[v * header.core + u];
-            }
-          }
-        }
+        AddWindow(header, i, j, window, weight, exitance[c]);
       }
     }
   }

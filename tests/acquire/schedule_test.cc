@@ -83,6 +83,7 @@ TEST(Schedule, OrderDependsOnTheSeedAlone) {
     rig.schedule.order_seed = seed;
     const Schedule schedule(rig);
     std::vector<std::pair<int, int>> points;
+    points.reserve(static_cast<std::size_t>(schedule.group_count()));
     for (int group = 0; group < schedule.group_count(); ++group) {
       points.emplace_back(schedule.Group(group)[0].i, schedule.Group(group)[0].j);
     }

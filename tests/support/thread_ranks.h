@@ -60,6 +60,7 @@ inline void OnThreadRanks(int size, const std::function<void(const Ranks&)>& bod
   std::vector<std::exception_ptr> errors(static_cast<std::size_t>(size));
   {
     std::vector<std::jthread> threads;
+    threads.reserve(errors.size());
     for (int rank = 0; rank < size; ++rank) {
       threads.emplace_back([&, rank] {
         try {
