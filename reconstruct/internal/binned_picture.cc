@@ -20,11 +20,12 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddPairs(
 // Sums over 2 × 2 values of a picture of odd or even sides.
 void Halve(const float* in, int width, int height, BinnedPicture& out) {
   const auto w = static_cast<std::size_t>(width);
+  const auto out_width = static_cast<std::size_t>(out.width);
   const std::vector<float> nothing(w, 0.0F);
   for (int y = 0; y < out.height; ++y) {
     const float* upper = in + static_cast<std::size_t>(2 * y) * w;
     const float* lower = 2 * y + 1 < height ? upper + w : nothing.data();
-    float* row = &out.values[static_cast<std::size_t>(std::int64_t{y} * out.width)];
+    float* row = &out.values[static_cast<std::size_t>(y) * out_width];
     AddPairs(upper, lower, w / 2, row);
     if (w % 2 != 0) {
       row[w / 2] = upper[w - 1] + lower[w - 1];

@@ -31,9 +31,9 @@ using ::testing::HasSubstr;
 
 // As few slices and as small a window as the block iteration takes.
 const RdDataset& Large() {
-  static const RdDataset dataset =
+  static const RdDataset kDataset =
       MakeChessboard({.points_x = 96, .points_y = 90, .core = 9, .noise = 1e-4});
-  return dataset;
+  return kDataset;
 }
 
 FactorOptions Options(const char* method) {
@@ -71,7 +71,8 @@ TEST(Factor, GivesTheSameMaterialOnAnyNumberOfRanks) {
   const RdDataset few =
       MakeChessboard({.points_x = 14, .points_y = 11, .core = 7, .noise = 0.01});
   const nacre::testing::TempFolder folder;
-  for (const char* method : {"reciprocal", "nmf", "tucker", "bilinear", "profiles", "auto"}) {
+  for (const char* method :
+       {"reciprocal", "nmf", "tucker", "bilinear", "profiles", "auto"}) {
     FactorOptions options{.method = method, .terms = 2};
     options.thread_count = 1;
     const Factorization alone = Factor(few, options);

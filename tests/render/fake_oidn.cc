@@ -15,6 +15,7 @@ const char* error;
 
 }  // namespace
 
+// NOLINTBEGIN(readability-identifier-naming): that library's names
 extern "C" {
 
 void* oidnNewDevice(int type) {
@@ -73,3 +74,4 @@ int oidnGetDeviceError(void*, const char** message) {
 }
 
 }  // extern "C"
+// NOLINTEND(readability-identifier-naming)
