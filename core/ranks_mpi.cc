@@ -134,7 +134,6 @@ void SetUpSharedMemory() {
   // spins. Here pieces go at once, as many as there is room for.
   set("OMPI_MCA_btl_vader_eager_limit", "32768");
   set("OMPI_MCA_btl_vader_max_send_size", "32768");
-  set("OMPI_MCA_btl_vader_segment_size", "33554432");
 }
 
 }  // namespace
