@@ -100,12 +100,12 @@ TEST(CaptureVerb, AnAdaptiveCaptureLeavesOutWhatReconstructionDoesntMiss) {
              folder / "x.rd.exr"});
   };
   // 1.2 ms overexpose nothing here: 0.24 ms say little more.
-  const std::pair<std::string, std::string> kLadder{
-      "exposures_us = [30000, 6000, 1200]", "exposures_us = [30000, 1200, 240]"};
-  RunJson({"capture", Rig(full, {kLadder}), "--out", full / "s"});
+  const std::pair<std::string, std::string> ladder{"exposures_us = [30000, 6000, 1200]",
+                                                   "exposures_us = [30000, 1200, 240]"};
+  RunJson({"capture", Rig(full, {ladder}), "--out", full / "s"});
   const Json summary =
       RunJson({"capture",
-               Rig(adaptive, {kLadder, {"[schedule]", "[adaptive]\n\n[schedule]"}}),
+               Rig(adaptive, {ladder, {"[schedule]", "[adaptive]\n\n[schedule]"}}),
                "--out",
                adaptive / "s"});
   EXPECT_GT(summary.at("pictures_left_out"), 10);
