@@ -72,8 +72,10 @@ std::vector<std::uint32_t> ProjectorPattern::Draw(std::span<const ScanAngle> spo
     for (int dy = -radius; dy <= radius; ++dy) {
       for (int dx = -radius; dx <= radius; ++dx) {
         if (4 * (dx * dx + dy * dy) <= options_.spot_px * options_.spot_px) {
-          const auto row = static_cast<std::size_t>(static_cast<int>(y) + dy);
-          const auto column = static_cast<std::size_t>(static_cast<int>(x) + dx);
+          const auto row =
+              static_cast<std::size_t>(std::int64_t{static_cast<int>(y)} + dy);
+          const auto column =
+              static_cast<std::size_t>(std::int64_t{static_cast<int>(x)} + dx);
           picture[row * static_cast<std::size_t>(width_) + column] = colour;
         }
       }

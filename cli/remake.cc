@@ -36,10 +36,10 @@ bool IsUnset(const std::string& key, const Json& value) {
 }
 
 std::string Flag(const std::string& key) {
-  static const std::map<std::string, std::string> kOthers{{"define", "-D"},
-                                                          {"beam_mm", "--beam"}};
-  const auto other = kOthers.find(key);
-  if (other != kOthers.end()) {
+  static const std::map<std::string, std::string> others{{"define", "-D"},
+                                                         {"beam_mm", "--beam"}};
+  const auto other = others.find(key);
+  if (other != others.end()) {
     return other->second;
   }
   std::string flag = "--" + key;

@@ -166,6 +166,24 @@ void SetAlbedo(Material& m) {
   }
 }
 
+// Cells of a window that lie on the grid are valid; returns how many don't.
+std::int64_t MarkInside(const reconstruct::RdHeader& header,
+                        int i,
+                        int j,
+                        std::uint8_t* valid) {
+  std::int64_t invalid = 0;
+  const int radius = header.Radius();
+  for (int v = -radius; v <= radius; ++v) {
+    for (int u = -radius; u <= radius; ++u) {
+      const bool known = i + u >= 0 && i + u < header.points_x && j + v >= 0 &&
+                         j + v < header.points_y;
+      *valid++ = known ? 1 : 0;
+      invalid += known ? 0 : 1;
+    }
+  }
+  return invalid;
+}
+
 }  // namespace
 
 Material ReadSss(const std::filesystem::path& path, const SssOptions& options) {
@@ -273,21 +291,14 @@ std::int64_t WriteSlices(const std::filesystem::path& path,
   reconstruct::RdWriter writer(path, header);
   reconstruct::RdSlice slice = reconstruct::MakeSlice(header);
   std::int64_t invalid = 0;
-  const int radius = header.Radius();
   for (int j = 0; j < header.points_y; ++j) {
     Report(progress, {"slices", j, header.points_y, ""});
     for (int i = 0; i < header.points_x; ++i) {
       std::size_t at = 0;
       for (int c = 0; c < static_cast<int>(m.channels.size()); ++c) {
         m.EvaluateWindow(c, i, j, &slice.rd[at]);
-        for (int v = -radius; v <= radius; ++v) {
-          for (int u = -radius; u <= radius; ++u) {
-            const bool known = i + u >= 0 && i + u < header.points_x && j + v >= 0 &&
-                               j + v < header.points_y;
-            slice.valid[at++] = known ? 1 : 0;
-            invalid += known ? 0 : 1;
-          }
-        }
+        invalid += MarkInside(header, i, j, &slice.valid[at]);
+        at += static_cast<std::size_t>(header.WindowSize());
       }
       writer.WriteSlice(i, j, slice);
     }

@@ -32,7 +32,7 @@ ExrPart MakeImage(const Floats& pixels,
     throw UsageError("Image(pixels): it must have three axes: height, width, channels");
   }
   const auto count = static_cast<std::size_t>(pixels.shape(2));
-  static const std::vector<std::string> kColor{"R", "G", "B", "A"};
+  static const std::vector<std::string> color{"R", "G", "B", "A"};
   ExrPart part{.name = "",
                .width = static_cast<int>(pixels.shape(1)),
                .height = static_cast<int>(pixels.shape(0)),
@@ -44,8 +44,8 @@ ExrPart MakeImage(const Floats& pixels,
   } else if (count == 1) {
     part.channels = {"Y"};
   } else if (count == 3 || count == 4) {
-    part.channels.assign(kColor.begin(),
-                         kColor.begin() + static_cast<std::ptrdiff_t>(count));
+    part.channels.assign(color.begin(),
+                         color.begin() + static_cast<std::ptrdiff_t>(count));
   }
   if (part.channels.size() != count || count == 0) {
     throw UsageError(

@@ -12,8 +12,8 @@ namespace nacre::render {
 namespace {
 
 const Ranks& RanksOf(const RenderOptions& options) {
-  static const Ranks kAlone;
-  return options.ranks == nullptr ? kAlone : *options.ranks;
+  static const Ranks alone;
+  return options.ranks == nullptr ? alone : *options.ranks;
 }
 
 bool IsDue(double every_s, Stopwatch& since) {

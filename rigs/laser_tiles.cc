@@ -266,8 +266,8 @@ void LaserTiles::AddRough(const TileSpot& spot,
 void LaserTiles::AddPixels(const TileSpot& spot,
                            Scratch& scratch,
                            float* exitance) const {
-  static const std::array kRules = {internal::GaussLegendre(kNearRules[0].order),
-                                    internal::GaussLegendre(kNearRules[1].order)};
+  static const std::array rules = {internal::GaussLegendre(kNearRules[0].order),
+                                   internal::GaussLegendre(kNearRules[1].order)};
   // Those near the spot leave the others.
   const double near_mm = kNearRules[1].radius_px * pixel_mm_;
   const double nearest_mm = kNearRules[0].radius_px * pixel_mm_;
@@ -291,8 +291,8 @@ void LaserTiles::AddPixels(const TileSpot& spot,
     const double dy = static_cast<double>(map_.y[pixel]) - spot.centre.y;
     const std::size_t which = dx * dx + dy * dy < nearest_mm * nearest_mm ? 0 : 1;
     scratch.near_order.push_back(static_cast<int>(which));
-    for (const double v : kRules[which].node) {
-      for (const double u : kRules[which].node) {
+    for (const double v : rules[which].node) {
+      for (const double u : rules[which].node) {
         const PointMm point = map_.At(static_cast<int>(pixel % width),
                                       static_cast<int>(pixel / width),
                                       0.5 * u,
@@ -308,7 +308,7 @@ void LaserTiles::AddPixels(const TileSpot& spot,
   }
   for (std::size_t k = 0; k < scratch.near_pixel.size(); ++k) {
     const internal::GaussRule& rule =
-        kRules[static_cast<std::size_t>(scratch.near_order[k])];
+        rules[static_cast<std::size_t>(scratch.near_order[k])];
     double mean = 0;
     for (const double b : rule.weight) {
       for (const double a : rule.weight) {

@@ -1,12 +1,30 @@
 #include "calibrate/internal/disc_sum.h"
 
 #include <cmath>
+#include <cstdint>
 
 namespace nacre::calibrate::internal {
 
 namespace {
 
 constexpr double kRingPx = 1.5;  // width of the ring
+
+// Pixels within `reach` columns and rows of one.
+struct PixelSquare {
+  int width;
+  int x0;
+  int y0;
+  int reach;
+
+  template <class Use>
+  void ForEach(Use&& use) const {
+    for (int y = y0 - reach; y <= y0 + reach; ++y) {
+      for (int x = x0 - reach; x <= x0 + reach; ++x) {
+        use(x, y, static_cast<std::size_t>(std::int64_t{y} * width + x));
+      }
+    }
+  }
+};
 
 }  // namespace
 
@@ -32,34 +50,35 @@ Disc SumDisc(const acquire::Frame& frame,
       y0 + reach >= frame.height) {
     return disc;
   }
+  const PixelSquare square{frame.width, x0, y0, reach};
   std::vector<double> ring;
+  square.ForEach([&](int x, int y, std::size_t k) {
+    const double r = std::hypot(x - about.x, y - about.y);
+    if (r > radius_px && r <= radius_px + kRingPx) {
+      ring.push_back(static_cast<double>(rates[k]));
+    }
+  });
+  double ground = 0;
+  for (const double value : ring) {
+    ground += value / static_cast<double>(ring.size());
+  }
   double sum_x = 0;
   double sum_y = 0;
   double count = 0;
-  for (int pass = 0; pass < 2; ++pass) {
-    double ground = 0;
-    for (const double value : ring) {
-      ground += value / static_cast<double>(ring.size());
+  bool is_saturated = false;
+  square.ForEach([&](int x, int y, std::size_t k) {
+    if (std::hypot(x - about.x, y - about.y) > radius_px) {
+      return;
     }
-    for (int y = y0 - reach; y <= y0 + reach; ++y) {
-      for (int x = x0 - reach; x <= x0 + reach; ++x) {
-        const auto k = static_cast<std::size_t>(y * frame.width + x);
-        const double r = std::hypot(x - about.x, y - about.y);
-        const auto rate = static_cast<double>(rates[k]);
-        if (pass == 0 && r > radius_px && r <= radius_px + kRingPx) {
-          ring.push_back(rate);
-        }
-        if (pass == 1 && r <= radius_px) {
-          if (frame.counts[k] >= calibration.saturation_counts) {
-            return disc;
-          }
-          disc.sum += rate - ground;
-          sum_x += (rate - ground) * x;
-          sum_y += (rate - ground) * y;
-          count += 1;
-        }
-      }
-    }
+    is_saturated = is_saturated || frame.counts[k] >= calibration.saturation_counts;
+    const double light = static_cast<double>(rates[k]) - ground;
+    disc.sum += light;
+    sum_x += light * x;
+    sum_y += light * y;
+    count += 1;
+  });
+  if (is_saturated) {
+    return {};
   }
   disc.is_whole = disc.sum > 0 && count > 0;
   if (disc.is_whole) {

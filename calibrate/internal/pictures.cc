@@ -1,6 +1,7 @@
 #include "calibrate/internal/pictures.h"
 
 #include <algorithm>
+#include <cstdint>
 
 namespace nacre::calibrate::internal {
 
@@ -54,7 +55,7 @@ void FillHotPixels(const std::vector<HotPixel>& pixels,
         if (x + dx < 0 || x + dx >= width || y + dy < 0 || y + dy >= height) {
           continue;
         }
-        const auto k = static_cast<std::size_t>((y + dy) * width + x + dx);
+        const auto k = static_cast<std::size_t>(std::int64_t{y + dy} * width + x + dx);
         if (!hot[k]) {
           sum += picture[k];
           ++count;

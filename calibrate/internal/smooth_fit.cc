@@ -7,8 +7,41 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace nacre::calibrate::internal {
+
+namespace {
+
+// A block of `picture`, or what of it lies in it.
+Block BlockMean(const std::vector<float>& picture,
+                int width,
+                cv::Rect block,
+                const std::vector<bool>& excluded) {
+  const int height = static_cast<int>(std::ssize(picture)) / width;
+  Block mean;
+  double u = 0;
+  double v = 0;
+  for (int y = block.y; y < std::min(block.y + block.height, height); ++y) {
+    for (int x = block.x; x < std::min(block.x + block.width, width); ++x) {
+      const auto k = static_cast<std::size_t>(std::int64_t{y} * width + x);
+      if (excluded.empty() || !excluded[k]) {
+        mean.mean += static_cast<double>(picture[k]);
+        u += 2 * (x + 0.5) / width - 1;
+        v += 2 * (y + 0.5) / height - 1;
+        ++mean.count;
+      }
+    }
+  }
+  if (mean.count > 0) {
+    mean.mean /= mean.count;
+    mean.u = u / mean.count;
+    mean.v = v / mean.count;
+  }
+  return mean;
+}
+
+}  // namespace
 
 std::vector<Block> BlockMeans(const std::vector<float>& picture,
                               int width,
@@ -18,24 +51,8 @@ std::vector<Block> BlockMeans(const std::vector<float>& picture,
   std::vector<Block> blocks;
   for (int top = 0; top < height; top += side) {
     for (int left = 0; left < width; left += side) {
-      Block block;
-      double u = 0;
-      double v = 0;
-      for (int y = top; y < std::min(top + side, height); ++y) {
-        for (int x = left; x < std::min(left + side, width); ++x) {
-          const auto k = static_cast<std::size_t>(y * width + x);
-          if (excluded.empty() || !excluded[k]) {
-            block.mean += static_cast<double>(picture[k]);
-            u += 2 * (x + 0.5) / width - 1;
-            v += 2 * (y + 0.5) / height - 1;
-            ++block.count;
-          }
-        }
-      }
+      const Block block = BlockMean(picture, width, {left, top, side, side}, excluded);
       if (block.count > 0) {
-        block.mean /= block.count;
-        block.u = u / block.count;
-        block.v = v / block.count;
         blocks.push_back(block);
       }
     }

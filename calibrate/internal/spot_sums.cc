@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 namespace nacre::calibrate::internal {
@@ -21,7 +22,7 @@ PixelGround MapPixels(const CameraGeometry& camera) {
   ground.width = camera.width_px;
   for (int y = 0; y < camera.height_px; ++y) {
     for (int x = 0; x < camera.width_px; ++x) {
-      const auto k = static_cast<std::size_t>(y * stride + x);
+      const auto k = static_cast<std::size_t>(std::int64_t{y} * stride + x);
       const PointMm& a = corners[k];
       const PointMm& b = corners[k + 1];
       const PointMm& c = corners[k + static_cast<std::size_t>(stride) + 1];

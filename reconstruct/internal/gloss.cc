@@ -47,6 +47,13 @@ SpotRings OnReference(const acquire::SessionReader& session,
   return rings;
 }
 
+SpotRings PerFlux(SpotRings rings, float flux) {
+  for (float& sum : rings.sum) {
+    sum /= flux;
+  }
+  return rings;
+}
+
 }  // namespace
 
 bool Gloss::IsFound() const {
@@ -93,12 +100,9 @@ Gloss MeasureGloss(const acquire::SessionReader& session,
         continue;
       }
       const auto flux = static_cast<float>(reader.RelativeFlux(g, c));
-      for (SpotRings rings : spool.Rings(g, c)) {
+      for (const SpotRings& rings : spool.Rings(g, c)) {
         if (!rings.empty()) {
-          for (float& sum : rings.sum) {
-            sum /= flux;
-          }
-          channel.spots.push_back(rings);
+          channel.spots.push_back(PerFlux(rings, flux));
         }
       }
     }

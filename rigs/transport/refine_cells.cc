@@ -23,15 +23,15 @@ struct Box {
 std::vector<double> MeansOf(std::span<const Box> boxes,
                             std::size_t channels,
                             const WindowFunction& function) {
-  static const internal::GaussRule kRule = internal::GaussLegendre(kOrder);
+  static const internal::GaussRule rule = internal::GaussLegendre(kOrder);
   const std::size_t count = boxes.size() * kCellNodes;
   std::vector<float> x;
   std::vector<float> y;
   x.reserve(count);
   y.reserve(count);
   for (const Box& box : boxes) {
-    for (const double v : kRule.node) {
-      for (const double u : kRule.node) {
+    for (const double v : rule.node) {
+      for (const double u : rule.node) {
         x.push_back(static_cast<float>(box.x_mm + 0.5 * box.side_mm * u));
         y.push_back(static_cast<float>(box.y_mm + 0.5 * box.side_mm * v));
       }
@@ -44,7 +44,7 @@ std::vector<double> MeansOf(std::span<const Box> boxes,
     for (std::size_t c = 0; c < channels; ++c) {
       double sum = 0;
       for (std::size_t k = 0; k < kCellNodes; ++k) {
-        sum += 0.25 * kRule.weight[k / kOrder] * kRule.weight[k % kOrder] *
+        sum += 0.25 * rule.weight[k / kOrder] * rule.weight[k % kOrder] *
                static_cast<double>(value[c * count + b * kCellNodes + k]);
       }
       means[b * channels + c] = sum;

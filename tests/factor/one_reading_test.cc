@@ -31,9 +31,9 @@ using ::testing::HasSubstr;
 
 // As few slices and as small a window as the block iteration takes.
 const RdDataset& Large() {
-  static const RdDataset kDataset =
+  static const RdDataset dataset =
       MakeChessboard({.points_x = 96, .points_y = 90, .core = 9, .noise = 1e-4});
-  return kDataset;
+  return dataset;
 }
 
 FactorOptions Options(const char* method) {
