@@ -22,6 +22,19 @@ std::array<Vector3, 3> RotationAbout(const Vector3& axis, double angle) {
            {t * x * z - s * y, t * y * z + s * x, t * z * z + c}}};
 }
 
+// Of a pixel that sees an edge.
+template <class ReflectanceAt>
+double MeanOverPixel(ReflectanceAt&& reflectance_at) {
+  constexpr int kSamples = 8;  // a side
+  double sum = 0;
+  for (int b = 0; b < kSamples; ++b) {
+    for (int a = 0; a < kSamples; ++a) {
+      sum += reflectance_at((a + 0.5) / kSamples - 0.5, (b + 0.5) / kSamples - 0.5);
+    }
+  }
+  return sum / (kSamples * kSamples);
+}
+
 }  // namespace
 
 double CheckerboardModel::ReflectanceAt(PointMm point) const {
@@ -69,7 +82,6 @@ std::vector<float> ViewCheckerboard(const CheckerboardModel& board,
                                     int thread_count) {
   const PlaneMap map = MapPlane(rays, camera_from_board);
   std::vector<float> image(map.x.size());
-  constexpr int kSamples = 8;  // a side of a pixel that sees an edge
   ParallelFor(map.height, thread_count, [&](std::int64_t row_index) {
     const int row = static_cast<int>(row_index);
     const auto reflectance = [&](int column, double du, double dv) {
@@ -81,17 +93,9 @@ std::vector<float> ViewCheckerboard(const CheckerboardModel& board,
                             centre == reflectance(column, 0.5, -0.5) &&
                             centre == reflectance(column, -0.5, 0.5) &&
                             centre == reflectance(column, 0.5, 0.5);
-      double mean = centre;
-      if (!is_plain) {
-        mean = 0;
-        for (int b = 0; b < kSamples; ++b) {
-          for (int a = 0; a < kSamples; ++a) {
-            mean += reflectance(
-                column, (a + 0.5) / kSamples - 0.5, (b + 0.5) / kSamples - 0.5);
-          }
-        }
-        mean /= kSamples * kSamples;
-      }
+      const double mean = is_plain ? centre : MeanOverPixel([&](double du, double dv) {
+        return reflectance(column, du, dv);
+      });
       image[map.Index(column, row)] = static_cast<float>(mean);
     }
   });

@@ -23,6 +23,20 @@ Span Within(double centre, double reach, double low, double size, int count) {
   return {clamped(first), clamped(last)};
 }
 
+void Fill(const Inclusion& inclusion, const std::array<Span, 3>& span, Voxels& voxels) {
+  for (int k = span[2].begin; k < span[2].end; ++k) {
+    for (int j = span[1].begin; j < span[1].end; ++j) {
+      for (int i = span[0].begin; i < span[0].end; ++i) {
+        const auto [x, y, depth] = voxels.layout.Centre(i, j, k);
+        if (inclusion.Contains(x, y, depth)) {
+          voxels.label[voxels.layout.Index(i, j, k)] =
+              static_cast<std::uint16_t>(inclusion.medium);
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 bool Inclusion::Contains(double x_mm, double y_mm, double depth_mm) const {
@@ -70,17 +84,7 @@ Voxels PlaceInclusions(const VoxelLayout& layout,
                           layout.size_mm[axis],
                           layout.count[axis]);
     }
-    for (int k = span[2].begin; k < span[2].end; ++k) {
-      for (int j = span[1].begin; j < span[1].end; ++j) {
-        for (int i = span[0].begin; i < span[0].end; ++i) {
-          const auto [x, y, depth] = layout.Centre(i, j, k);
-          if (inclusion.Contains(x, y, depth)) {
-            voxels.label[layout.Index(i, j, k)] =
-                static_cast<std::uint16_t>(inclusion.medium);
-          }
-        }
-      }
-    }
+    Fill(inclusion, span, voxels);
   }
   return voxels;
 }

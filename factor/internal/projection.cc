@@ -6,6 +6,7 @@
 #include "reconstruct/error_figures.h"
 
 #include <algorithm>
+#include <span>
 #include <cmath>
 
 namespace nacre::factor::internal {
@@ -27,6 +28,25 @@ void StoreScores(const SvdModel& model, Material& m) {
         map[point] = static_cast<float>(
             static_cast<double>(model.scores[c][point * rank + j]) * scale);
       }
+    }
+  }
+}
+
+struct ScaleAndFloor {
+  double scale;  // of the model's values
+  double floor;  // of the logarithm
+};
+
+void AddErrors(std::span<const float> rd,
+               std::span<const std::uint8_t> valid,
+               std::span<const float> values,
+               ScaleAndFloor figures,
+               FitError& error) {
+  for (std::size_t cell = 0; cell < rd.size(); ++cell) {
+    if (valid[cell] != 0) {
+      error.Add(static_cast<double>(rd[cell]),
+                static_cast<double>(values[cell]) * figures.scale,
+                figures.floor);
     }
   }
 }
@@ -79,14 +99,11 @@ std::vector<TermsError> ErrorCurve(const Job& job, const SvdModel& model, int te
             static_cast<int>(c), static_cast<int>(row), 0, n, values.data());
         const double scale = TotalScale(
             {&sample.rd[offset], window}, {&sample.valid[offset], window}, values);
-        FitError& error = errors[static_cast<std::size_t>(row * terms + n - 1)];
-        for (std::size_t cell = 0; cell < window; ++cell) {
-          if (sample.valid[offset + cell] != 0) {
-            error.Add(static_cast<double>(sample.rd[offset + cell]),
-                      static_cast<double>(values[cell]) * scale,
-                      floor);
-          }
-        }
+        AddErrors({&sample.rd[offset], window},
+                  {&sample.valid[offset], window},
+                  values,
+                  {scale, floor},
+                  errors[static_cast<std::size_t>(row * terms + n - 1)]);
       }
     }
   });

@@ -31,6 +31,13 @@ using RowWork = std::function<void(ReciprocalRows& rows,
                                    std::vector<float>& s,
                                    SharedMaps& sum)>;
 
+// A held offset of a channel: where its pairs begin, and their share.
+struct HeldRows {
+  ReciprocalRows rows;
+  std::size_t pairs;
+  float share;
+};
+
 // Calls `work` for each row of each held offset and channel, `pairs` being where the
 // row's begin, and adds up what it adds to `sum`, of `height` rows. Offsets of a group
 // take turns at each row of points, so that the maps' rows stay at hand.
@@ -47,30 +54,29 @@ SharedMaps OverRows(const ReciprocalData& data,
     const auto g = static_cast<std::size_t>(share.begin + own);
     RowScratch scratch;
     std::vector<float> s;
-    std::vector<ReciprocalRows> offsets;
+    std::vector<HeldRows> offsets;
     for (std::size_t n = g; n < data.held.size(); n += kGroups) {
       for (std::size_t c = 0; c < data.channels; ++c) {
         const auto cell = static_cast<std::size_t>(data.held[n]);
-        offsets.emplace_back(data, fit, c, cell, scratch);
+        offsets.push_back({ReciprocalRows(data, fit, c, cell, scratch),
+                           data.HeldOffset(c, n),
+                           data.share[n]});
       }
     }
     for (int y = 0; y < data.height; ++y) {
-      for (std::size_t n = g, at = 0; n < data.held.size(); n += kGroups) {
-        for (std::size_t c = 0; c < data.channels; ++c, ++at) {
-          ReciprocalRows& rows = offsets[at];
-          const PlaneArea& area = rows.area();
-          if (y < area.y0 || y >= area.y1) {
-            continue;
-          }
-          rows.Look(y);
-          s.resize(rows.Points());
-          work(rows,
-               data.HeldOffset(c, n) +
-                   static_cast<std::size_t>(y * data.width + area.x0),
-               data.share[n],
-               s,
-               sums[static_cast<std::size_t>(own)]);
+      for (HeldRows& held : offsets) {
+        const PlaneArea& area = held.rows.area();
+        if (y < area.y0 || y >= area.y1) {
+          continue;
         }
+        held.rows.Look(y);
+        s.resize(held.rows.Points());
+        work(held.rows,
+             held.pairs +
+                 static_cast<std::size_t>(std::int64_t{y} * data.width + area.x0),
+             held.share,
+             s,
+             sums[static_cast<std::size_t>(own)]);
       }
     }
   });
@@ -176,11 +182,10 @@ class Preconditioner {
           Eigen::Index row = 0;
           for (Eigen::Index j = 0; j < terms_; ++j) {
             for (Eigen::Index k = 0; k <= j; ++k, ++row) {
-              for (std::int64_t p = p0; p < p1; ++p) {
-                result(j, p) += blocks_(row, p) * r(k, p);
-                if (j != k) {
-                  result(k, p) += blocks_(row, p) * r(j, p);
-                }
+              const auto n = static_cast<std::size_t>(p1 - p0);
+              AddProduct(&result(j, p0), &blocks_(row, p0), &r(k, p0), n);
+              if (j != k) {
+                AddProduct(&result(k, p0), &blocks_(row, p0), &r(j, p0), n);
               }
             }
           }

@@ -8,6 +8,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
+#include <span>
 
 namespace nacre::factor::internal {
 namespace {
@@ -37,6 +39,28 @@ std::vector<Interval> KnownWanted(const Job& job, double bound) {
   return wanted;
 }
 
+// What a slice adds up to with the model's values, scaled to the measured ones, where
+// nothing was measured; none if either is dark.
+std::optional<double> WholeTotal(std::span<const float> rd,
+                                 std::span<const std::uint8_t> valid,
+                                 std::span<const float> values) {
+  double measured = 0;
+  double modelled = 0;
+  double whole = 0;
+  for (std::size_t n = 0; n < rd.size(); ++n) {
+    const auto value = static_cast<double>(values[n]);
+    whole += value;
+    if (valid[n] != 0) {
+      measured += static_cast<double>(rd[n]);
+      modelled += value;
+    }
+  }
+  if (measured > 0 && modelled > 0) {
+    return measured * whole / modelled;
+  }
+  return std::nullopt;
+}
+
 std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
   if (!job.totals.empty()) {
     return KnownWanted(job, bound);
@@ -61,21 +85,14 @@ std::vector<Interval> Wanted(Job& job, double bound, const Material& m) {
           values.data());
       const std::size_t slice = static_cast<std::size_t>(row) * values.size();
       for (std::size_t c = 0; c < m.channels.size(); ++c) {
-        double measured = 0;
-        double modelled = 0;
-        double whole = 0;
-        for (std::size_t n = c * window; n < (c + 1) * window; ++n) {
-          const auto value = static_cast<double>(values[n]);
-          whole += value;
-          if (block.valid[slice + n] != 0) {
-            measured += static_cast<double>(block.rd[slice + n]);
-            modelled += value;
-          }
-        }
-        if (measured > 0 && modelled > 0) {
+        const std::size_t at = slice + c * window;
+        const auto total =
+            WholeTotal({block.rd + at, window},
+                       {block.valid + at, window},
+                       std::span<const float>(values).subspan(c * window, window));
+        if (total) {
           wanted[c * static_cast<std::size_t>(points) +
-                 static_cast<std::size_t>(point)] =
-              Around(measured * whole / modelled, bound);
+                 static_cast<std::size_t>(point)] = Around(*total, bound);
         }
       }
     });

@@ -382,12 +382,12 @@ class Factored final : public SubsurfaceModel {
 }  // namespace
 
 std::shared_ptr<const SubsurfaceModel> MakeMeasured(
-    std::shared_ptr<const WindowSource> source,
+    const std::shared_ptr<const WindowSource>& source,
     const FactoredOptions& options,
     const SampleOnSurface& mapping) {
   Expect(source != nullptr, "a measured subsurface model needs a source");
   Validate(options);
-  return std::make_shared<Factored>(std::move(source), options, mapping);
+  return std::make_shared<Factored>(source, options, mapping);
 }
 
 std::shared_ptr<const SubsurfaceModel> MakeFactored(

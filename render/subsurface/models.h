@@ -82,7 +82,7 @@ struct SampleOnSurface {
 /// R_d as measured, from wherever. One channel serves all three colours, three serve
 /// R, G, B in order; BadData for any other number.
 std::shared_ptr<const SubsurfaceModel> MakeMeasured(
-    std::shared_ptr<const WindowSource> source,
+    const std::shared_ptr<const WindowSource>& source,
     const FactoredOptions& options = {},
     const SampleOnSurface& mapping = {});
 

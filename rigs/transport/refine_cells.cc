@@ -69,6 +69,16 @@ std::vector<Box> Quarters(std::span<const Box> boxes) {
   return quarters;
 }
 
+// A box's means, by channels, to the sums over its cell.
+void AddBox(const Box& box,
+            std::span<const double> means,
+            std::size_t cell_count,
+            std::vector<double>& sums) {
+  for (std::size_t c = 0; c < means.size(); ++c) {
+    sums[c * cell_count + box.cell] += box.part * means[c];
+  }
+}
+
 }  // namespace
 
 void IntegrateCells(const CellQuadrature& quadrature,
@@ -134,10 +144,7 @@ void RefineCells(const RefineOptions& options,
         const auto from =
             quarter_means.begin() + static_cast<std::ptrdiff_t>((4 * b + q) * channels);
         if (is_good) {
-          for (std::size_t c = 0; c < channels; ++c) {
-            sums[c * cell_count + quarter.cell] +=
-                quarter.part * from[static_cast<std::ptrdiff_t>(c)];
-          }
+          AddBox(quarter, {from, channels}, cell_count, sums);
         } else {
           open.push_back(quarter);
           open_means.insert(

@@ -131,6 +131,16 @@ inline Stencil1d FineOf(std::size_t coarse, std::size_t coarse_n, std::size_t fi
 }
 
 template <class Real>
+[[gnu::always_inline]] inline void AddColumn(Real weight,
+                                             const Lanes<Real>* in,
+                                             std::size_t nz,
+                                             Lanes<Real>* out) {
+  for (std::size_t k = 0; k < nz; ++k) {
+    out[k].v += weight * in[k].v;
+  }
+}
+
+template <class Real>
 [[gnu::always_inline]] inline void RestrictBody(const LevelView<Real>& fine,
                                                 const LevelView<Real>& coarse,
                                                 const Lanes<Real>* r,
@@ -150,10 +160,8 @@ template <class Real>
             continue;  // no residual there
           }
           const Real weight = static_cast<Real>(sy.weight[b] * sx.weight[a]);
-          const Lanes<Real>* in = r + ((sy.first + b) * fine.nx + sx.first + a) * nz;
-          for (std::size_t k = 0; k < nz; ++k) {
-            out[k].v += weight * in[k].v;
-          }
+          AddColumn(
+              weight, r + ((sy.first + b) * fine.nx + sx.first + a) * nz, nz, out);
         }
       }
     }
