@@ -6,8 +6,8 @@
 #include "reconstruct/error_figures.h"
 
 #include <algorithm>
-#include <span>
 #include <cmath>
+#include <span>
 
 namespace nacre::factor::internal {
 
