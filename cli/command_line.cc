@@ -12,8 +12,8 @@
 namespace nacre::cli {
 namespace {
 
-// NOLINTNEXTLINE(cppcoreguidelines-avoid-non-const-global-variables): a signal
-// handler's
+// A signal handler's.
+// NOLINTNEXTLINE(cppcoreguidelines-avoid-non-const-global-variables)
 volatile std::sig_atomic_t interrupt_count = 0;
 
 extern "C" void OnInterrupt(int signal) {

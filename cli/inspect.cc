@@ -22,7 +22,9 @@
 #endif
 
 #include <cmath>
+#include <cstdint>
 #include <memory>
+#include <span>
 
 namespace nacre::cli {
 namespace {
@@ -32,39 +34,56 @@ struct InspectArguments {
   bool provenance = false;
 };
 
+// What the values of a channel are.
+struct ChannelContents {
+  ValueRange values;
+  ValueRange albedos;
+  std::int64_t invalid = 0;
+  std::int64_t negative = 0;
+
+  void Add(std::span<const float> rd,
+           std::span<const std::uint8_t> valid,
+           double cell_area_mm2) {
+    double total = 0;
+    for (std::size_t k = 0; k < rd.size(); ++k) {
+      if (valid[k] == 0) {
+        ++invalid;
+        continue;
+      }
+      const auto value = static_cast<double>(rd[k]);
+      values.Add(value);
+      negative += value < 0 ? 1 : 0;
+      total += value;
+    }
+    albedos.Add(total * cell_area_mm2);
+  }
+};
+
 // What a pass over all slices, which verifies their checksums, finds.
 Json DatasetContents(reconstruct::RdReader& reader, const ProgressFunction& progress) {
   const reconstruct::RdHeader& header = reader.header();
   const auto window = static_cast<std::size_t>(header.WindowSize());
-  std::vector<ValueRange> values(header.channels.size());
-  std::vector<ValueRange> albedos(header.channels.size());
-  std::int64_t invalid = 0;
-  std::int64_t negative = 0;
+  std::vector<ChannelContents> contents(header.channels.size());
   for (int j = 0; j < header.points_y; ++j) {
     Report(progress, {"inspect", j, header.points_y, ""});
     for (int i = 0; i < header.points_x; ++i) {
       const reconstruct::RdSlice slice = reader.ReadSlice(i, j);
-      for (std::size_t c = 0; c < values.size(); ++c) {
-        double total = 0;
-        for (std::size_t k = c * window; k < (c + 1) * window; ++k) {
-          if (slice.valid[k] == 0) {
-            ++invalid;
-            continue;
-          }
-          const auto value = static_cast<double>(slice.rd[k]);
-          values[c].Add(value);
-          negative += value < 0 ? 1 : 0;
-          total += value;
-        }
-        albedos[c].Add(total * header.CellAreaMm2());
+      for (std::size_t c = 0; c < contents.size(); ++c) {
+        contents[c].Add({&slice.rd[c * window], window},
+                        {&slice.valid[c * window], window},
+                        header.CellAreaMm2());
       }
     }
   }
   Json channels = Json::array();
-  for (std::size_t c = 0; c < values.size(); ++c) {
+  std::int64_t invalid = 0;
+  std::int64_t negative = 0;
+  for (std::size_t c = 0; c < contents.size(); ++c) {
     channels.push_back({{"name", header.channels[c]},
-                        {"rd_per_mm2", values[c].ToJson()},
-                        {"albedo", albedos[c].ToJson()}});
+                        {"rd_per_mm2", contents[c].values.ToJson()},
+                        {"albedo", contents[c].albedos.ToJson()}});
+    invalid += contents[c].invalid;
+    negative += contents[c].negative;
   }
   return {{"channels", channels},
           {"invalid_values", invalid},
