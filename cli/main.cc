@@ -39,7 +39,8 @@ void Silence() {
 }
 
 // One rank's failure is that of all: its message, then the end of every process. What
-// several find out at a time is left to the root to say.
+// several find out at a time is left to the root to say, whose end takes a second or two
+// to reach the others.
 int Fail(const Ranks* ranks, const std::string& message, ExitCode code) {
   const auto exit_code = static_cast<int>(code);
   if (ranks == nullptr || ranks->size() == 1) {
@@ -47,7 +48,7 @@ int Fail(const Ranks* ranks, const std::string& message, ExitCode code) {
     return exit_code;
   }
   if (!ranks->IsRoot()) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    std::this_thread::sleep_for(std::chrono::seconds(3));
   }
   const std::string line = fmt::format("nacre: rank {}: {}\n", ranks->rank(), message);
   std::fputs(line.c_str(), stderr);
