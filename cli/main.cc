@@ -39,8 +39,8 @@ void Silence() {
 }
 
 // One rank's failure is that of all: its message, then the end of every process. What
-// several find out at a time is left to the root to say, whose end takes a second or two
-// to reach the others.
+// several find out at a time is left to the root to say, whose end takes a second or
+// two to reach the others.
 int Fail(const Ranks* ranks, const std::string& message, ExitCode code) {
   const auto exit_code = static_cast<int>(code);
   if (ranks == nullptr || ranks->size() == 1) {
