@@ -20,7 +20,7 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
-// What a child may end with; anything else isn't ours.
+// What a child of ours may end with; a library, or a sanitizer, may end it otherwise.
 constexpr std::array kKnown = {ExitCode::kFailed,
                                ExitCode::kUsage,
                                ExitCode::kBadData,
@@ -100,7 +100,13 @@ std::unique_ptr<MappedFile> RunInChild(const std::string& origin,
     if (code == ExitCode::kDone) {
       return std::make_unique<MappedFile>(path);
     }
-    Expect(std::ranges::find(kKnown, code) != kKnown.end(), "an exit code of ours");
+    if (std::ranges::find(kKnown, code) == kKnown.end()) {
+      throw BadData(
+          fmt::format("{}: the library that reads it ended its process (exit code "
+                      "{}): damaged, or made to do that",
+                      origin,
+                      WEXITSTATUS(status)));
+    }
     throw Error(TextOf(path), code);
   }
   switch (const int signal = WTERMSIG(status)) {

@@ -43,15 +43,15 @@ int ErrnoOf(const std::string& name) {
   static const struct {
     const char* name;
     int value;
-  } kNames[] = {{"EIO", EIO},
-                {"ENOSPC", ENOSPC},
-                {"EINTR", EINTR},
-                {"EACCES", EACCES},
-                {"EROFS", EROFS},
-                {"EMFILE", EMFILE},
-                {"EDQUOT", EDQUOT},
-                {"ENOMEM", ENOMEM}};
-  for (const auto& known : kNames) {
+  } names[] = {{"EIO", EIO},
+               {"ENOSPC", ENOSPC},
+               {"EINTR", EINTR},
+               {"EACCES", EACCES},
+               {"EROFS", EROFS},
+               {"EMFILE", EMFILE},
+               {"EDQUOT", EDQUOT},
+               {"ENOMEM", ENOMEM}};
+  for (const auto& known : names) {
     if (name == known.name) {
       return known.value;
     }
@@ -281,6 +281,7 @@ FILE* fopen(const char* path, const char* mode) {
   return fails ? nullptr : real(path, mode);
 }
 
+// NOLINTBEGIN(bugprone-reserved-identifier,readability-identifier-naming): libc
 void* __libc_malloc(size_t);
 void* __libc_calloc(size_t, size_t);
 void* __libc_realloc(void*, size_t);
@@ -307,6 +308,7 @@ void* realloc(void* old, size_t size) {
 void* memalign(size_t alignment, size_t size) {
   return MemoryFails(size) ? nullptr : __libc_memalign(alignment, size);
 }
+// NOLINTEND(bugprone-reserved-identifier,readability-identifier-naming)
 
 void* aligned_alloc(size_t alignment, size_t size) {
   return memalign(alignment, size);

@@ -46,6 +46,8 @@ TEST(ChildProcess, ItsDeathIsAnError) {
     EXPECT_THAT(ChildMessage(die),
                 HasSubstr("a.mat: the library that reads it died of it"));
   }
+  const auto leave = [](int) { ::_exit(99); };
+  EXPECT_THAT(ChildMessage(leave), HasSubstr("ended its process (exit code 99)"));
   const auto die = [](int) { std::raise(SIGKILL); };
   EXPECT_THAT(ChildMessage(die, ExitCode::kFailed), HasSubstr("want of memory"));
   const auto stop = [](int) { std::raise(SIGINT); };
