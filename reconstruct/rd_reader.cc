@@ -1,6 +1,7 @@
 #include "core/error.h"
 #include "core/exr_guard.h"
 #include "reconstruct/internal/rd_format.h"
+#include "reconstruct/internal/tile_reader.h"
 #include "reconstruct/rd_dataset.h"
 
 #include <OpenEXR/ImfChannelList.h>
@@ -8,11 +9,12 @@
 #include <OpenEXR/ImfMultiPartInputFile.h>
 #include <OpenEXR/ImfPartType.h>
 #include <OpenEXR/ImfTileDescription.h>
-#include <OpenEXR/ImfTiledInputPart.h>
 
-#include <cmath>
+#include <algorithm>
+#include <bit>
 #include <fmt/format.h>
 #include <optional>
+#include <span>
 
 namespace nacre::reconstruct {
 namespace {
@@ -36,6 +38,30 @@ auto Checked(const std::string& origin, const std::string& doing, Call&& call) {
   } catch (const std::exception& e) {
     throw BadData(fmt::format("{}: {}: {}", origin, doing, e.what()));
   }
+}
+
+// Both go through all values without a branch, which compilers make vectors of.
+
+bool AllFinite(std::span<const float> values) {
+  constexpr std::uint32_t kExponent = 0x7F800000;
+  std::uint32_t bad = 0;
+  for (const float value : values) {
+    bad |= (std::bit_cast<std::uint32_t>(value) & kExponent) == kExponent ? 1U : 0U;
+  }
+  return bad == 0;
+}
+
+// Whether all halves are 0 or 1, which become so many flags.
+bool ToFlags(std::span<const std::uint16_t> halves, std::vector<std::uint8_t>& flags) {
+  std::uint16_t bad = 0;
+  for (const std::uint16_t half : halves) {
+    bad |= half == 0 || half == internal::kHalfOne ? 0 : 1;
+  }
+  flags.resize(halves.size());
+  std::ranges::transform(halves, flags.begin(), [](std::uint16_t half) {
+    return static_cast<std::uint8_t>(half == internal::kHalfOne);
+  });
+  return bad == 0;
 }
 
 void CheckPart(const Imf::Header& part,
@@ -90,9 +116,8 @@ struct RdReader::File {
     tile.emplace(header);
     ReadChecksums();
     for (int p = 0; p < kChecksum; ++p) {
-      tiles[static_cast<std::size_t>(p)].emplace(input, p);
-      tiles[static_cast<std::size_t>(p)]->setFrameBuffer(
-          tile->FrameBuffer(static_cast<internal::Part>(p)));
+      tiles[static_cast<std::size_t>(p)].emplace(
+          input, *tile, static_cast<internal::Part>(p));
     }
   }
 
@@ -152,7 +177,7 @@ struct RdReader::File {
   std::optional<internal::TileBuffer> tile;
   // The parts refer to the file: they are declared after and destroyed before it.
   Imf::MultiPartInputFile input;
-  std::array<std::optional<Imf::TiledInputPart>, kChecksum> tiles;
+  std::array<std::optional<internal::TileReader>, kChecksum> tiles;
 };
 
 RdReader::RdReader(const std::filesystem::path& path) {
@@ -181,21 +206,16 @@ RdSlice RdReader::ReadSlice(int i, int j) {
   const std::string name = SliceName(header, s);
   Checked(file.origin, "cannot read " + name, [&] {
     for (auto& part : file.tiles) {
-      part->readTile(i, j);
+      part->Read(i, j);
     }
   });
-  RdSlice slice{
-      file.tile->rd, file.tile->sigma, std::vector<std::uint8_t>(file.tile->rd.size())};
-  for (std::size_t k = 0; k < slice.rd.size(); ++k) {
-    slice.valid[k] = file.tile->valid[k] == internal::kHalfOne ? 1 : 0;
-    if (!std::isfinite(slice.rd[k]) || !std::isfinite(slice.sigma[k])) {
-      throw BadData(
-          fmt::format("{}: {} holds a NaN or an infinity", file.origin, name));
-    }
-    if (file.tile->valid[k] != internal::kHalfOne && file.tile->valid[k] != 0) {
-      throw BadData(
-          fmt::format("{}: {} has a validity other than 0 and 1", file.origin, name));
-    }
+  RdSlice slice{file.tile->rd, file.tile->sigma, {}};
+  if (!AllFinite(slice.rd) || !AllFinite(slice.sigma)) {
+    throw BadData(fmt::format("{}: {} holds a NaN or an infinity", file.origin, name));
+  }
+  if (!ToFlags(file.tile->valid, slice.valid)) {
+    throw BadData(
+        fmt::format("{}: {} has a validity other than 0 and 1", file.origin, name));
   }
   if (file.checksum->Of(s, slice) != file.checksums[static_cast<std::size_t>(s)]) {
     throw BadData(fmt::format(

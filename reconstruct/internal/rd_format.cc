@@ -121,7 +121,7 @@ TileBuffer::TileBuffer(const RdHeader& header)
 Imf::FrameBuffer TileBuffer::FrameBuffer(Part part) {
   Imf::FrameBuffer buffer;
   const auto window = static_cast<std::size_t>(core) * static_cast<std::size_t>(core);
-  const std::size_t bytes = part == kValid ? sizeof(std::uint16_t) : sizeof(float);
+  const std::size_t bytes = ValueBytes(part);
   void* base = part == kRd      ? static_cast<void*>(rd.data())
                : part == kSigma ? static_cast<void*>(sigma.data())
                                 : static_cast<void*>(valid.data());

@@ -34,6 +34,9 @@ RdHeader HeaderFromAttributes(const Imf::Header& part, const std::string& origin
 struct TileBuffer {
   explicit TileBuffer(const RdHeader& header);
   Imf::FrameBuffer FrameBuffer(Part part);
+  static std::size_t ValueBytes(Part part) {
+    return part == kValid ? sizeof(std::uint16_t) : sizeof(float);
+  }
 
   std::vector<std::string> channels;
   int core;

@@ -75,6 +75,32 @@ TEST(RdDataset, OneSliceIsReadAlone) {
   EXPECT_TRUE(std::equal(slice.rd.begin(), slice.rd.end(), dataset.rd.end() - size));
 }
 
+TEST(RdDataset, SlicesThatPackAndThoseThatDoNotAreReadInAnyOrder) {
+  const testing::TempFolder folder;
+  RdHeader header = RandomHeader(4);
+  header.points_x = 6;
+  header.points_y = 5;
+  RdDataset dataset = RandomDataset(header, 4);
+  const std::ptrdiff_t size = header.SliceSize();
+  for (std::ptrdiff_t s = 0; s < header.PointCount(); ++s) {
+    if (s % 3 != 0) {  // one of two constants, and every other sigma unknown
+      std::fill_n(dataset.rd.begin() + s * size, size, s % 3 == 1 ? 0.5F : 0.25F);
+      std::fill_n(dataset.sigma.begin() + s * size, size, s % 2 == 0 ? 0.0F : 1e-6F);
+    }
+  }
+  WriteDataset(folder / "x.rd.exr", dataset);
+  RdReader reader(folder / "x.rd.exr");
+  for (std::int64_t k = 0; k < 7 * header.PointCount(); ++k) {
+    const std::int64_t s = k * k % header.PointCount();
+    const RdSlice slice = reader.ReadSlice(static_cast<int>(s % header.points_x),
+                                           static_cast<int>(s / header.points_x));
+    const RdSlice expected = testing::SliceOf(dataset, s);
+    EXPECT_EQ(slice.rd, expected.rd) << s;
+    EXPECT_EQ(slice.sigma, expected.sigma) << s;
+    EXPECT_EQ(slice.valid, expected.valid) << s;
+  }
+}
+
 TEST(RdDataset, BytesDoNotDependOnTheOrderOfWriting) {
   const testing::TempFolder folder;
   RdHeader header = RandomHeader(5);
