@@ -1,6 +1,7 @@
 #include "acquire/frame_file.h"
 
 #include "core/error.h"
+#include "core/simd_clones.h"
 #include "core/write_all.h"
 
 #include <algorithm>
@@ -43,8 +44,9 @@ namespace {
 using Word [[gnu::aligned(1), gnu::may_alias]] = std::uint16_t;
 
 // Big endian, as PGM wants it.
-__attribute__((target_clones("avx2", "default"))) void PutWords(
-    const std::uint16_t* counts, std::size_t count, char* bytes) {
+NACRE_AVX2_CLONES void PutWords(const std::uint16_t* counts,
+                                std::size_t count,
+                                char* bytes) {
   auto* words = reinterpret_cast<Word*>(bytes);
   if constexpr (std::endian::native == std::endian::little) {
     for (std::size_t k = 0; k < count; ++k) {

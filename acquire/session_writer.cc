@@ -4,6 +4,7 @@
 #include "core/atomic_file.h"
 #include "core/error.h"
 #include "core/hash.h"
+#include "core/simd_clones.h"
 #include "core/version.h"
 
 #include <algorithm>
@@ -112,8 +113,8 @@ struct CountFigures {
   std::int64_t bright = 0;
 };
 
-__attribute__((target_clones("avx2", "default"))) CountFigures Figures(
-    const std::vector<std::uint16_t>& counts, int bit_depth) {
+NACRE_AVX2_CLONES CountFigures Figures(const std::vector<std::uint16_t>& counts,
+                                       int bit_depth) {
   std::uint16_t first_bright = 0;  // IsBright is monotonic
   while (!IsBright(first_bright, bit_depth)) {
     ++first_bright;

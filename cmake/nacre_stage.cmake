@@ -20,10 +20,6 @@ if(NOT NACRE_SANITIZE)
 else()
   target_compile_options(nacre_flags INTERFACE -fsanitize=${NACRE_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(nacre_flags INTERFACE -fsanitize=${NACRE_SANITIZE})
-  if(NACRE_SANITIZE MATCHES "thread")
-    # What chooses among the clones of a function runs before TSan is there to be called.
-    target_compile_options(nacre_flags INTERFACE "-Dtarget_clones(...)=unused")
-  endif()
 endif()
 
 set_property(GLOBAL PROPERTY NACRE_STAGES "")

@@ -1,6 +1,7 @@
 #include "core/parallel.h"
 
 #include "core/error.h"
+#include "core/sanitizers.h"
 
 #include <algorithm>
 #include <atomic>
@@ -12,12 +13,6 @@
 #include <tbb/task_arena.h>
 #include <thread>
 #include <vector>
-
-#ifdef __has_feature
-#define NACRE_UNDER_TSAN __has_feature(thread_sanitizer)
-#else
-#define NACRE_UNDER_TSAN 0
-#endif
 
 namespace nacre {
 namespace {

@@ -139,11 +139,11 @@ Material EmptyProfiles(const SssLayout& layout, const SssOptions& options) {
 // Of weight `n` of a record, its place in a map set, given the record's place.
 std::size_t MapIndex(const Material& m, std::size_t n, std::size_t i, std::size_t row) {
   const std::size_t gaussian = n / kColours;
-  const std::size_t channel = n % kColours;
+  const std::size_t set = m.SharesMaps() ? 0 : n % kColours;
   const auto y = static_cast<std::size_t>(m.points_y) - 1 - row;  // lowest row first
   const auto width = static_cast<std::size_t>(m.MapWidth());
   const auto margin = static_cast<std::size_t>(m.margin);
-  return (channel * static_cast<std::size_t>(m.terms) + gaussian) *
+  return (set * static_cast<std::size_t>(m.terms) + gaussian) *
              static_cast<std::size_t>(m.MapSize()) +
          (y + margin) * width + i + margin;
 }
@@ -269,7 +269,8 @@ std::int64_t WriteSss(const std::filesystem::path& path, const Material& m) {
     }
   }
   for (std::size_t n = 0; n < record; ++n) {
-    const float log_beta = m.h[n % kColours * layout.gaussians + n / kColours];
+    const std::size_t set = m.SharesKernels() ? 0 : n % kColours;
+    const float log_beta = m.h[set * layout.gaussians + n / kColours];
     put(std::exp(static_cast<double>(log_beta)) * m.pitch_mm * m.pitch_mm);
   }
   WriteFile(path, bytes);

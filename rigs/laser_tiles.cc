@@ -1,7 +1,8 @@
 #include "rigs/laser_tiles.h"
 
+#include "core/simd_clones.h"
+#include "rigs/internal/fast_exp2.h"
 #include "rigs/internal/gauss_legendre.h"
-#include "rigs/internal/simd.h"
 
 #include <algorithm>
 #include <array>

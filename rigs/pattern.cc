@@ -1,7 +1,7 @@
 #include "rigs/pattern.h"
 
 #include "core/error.h"
-#include "rigs/internal/simd.h"
+#include "core/simd_clones.h"
 #include "rigs/pattern_mixture.h"
 
 #include <algorithm>

@@ -3,7 +3,8 @@
 #include "core/error.h"
 #include "core/parallel.h"
 #include "core/random.h"
-#include "rigs/internal/simd.h"
+#include "core/simd_clones.h"
+#include "rigs/internal/fast_exp2.h"
 
 #include <algorithm>
 #include <array>

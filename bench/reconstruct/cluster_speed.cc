@@ -9,6 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/random.h"
+#include "core/simd_clones.h"
 #include "reconstruct/clustering.h"
 #include "reconstruct/internal/kmeans.h"
 #include "reconstruct/internal/lanes.h"
@@ -89,8 +90,7 @@ PointSet AllValues(const RdDataset& dataset, double offset) {
   return points;
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) float Distance2(
-    const float* a, const float* b, int size) {
+NACRE_SIMD_CLONES float Distance2(const float* a, const float* b, int size) {
   // Two sums, so that neither waits for the other.
   internal::Lanes sum[2] = {};
   int d = 0;

@@ -1,5 +1,6 @@
 #include "factor/internal/reciprocal.h"
 
+#include "core/simd_clones.h"
 #include "factor/internal/reciprocal_taps.h"
 
 #include <algorithm>
@@ -138,8 +139,10 @@ class Features {
   std::vector<double> values_;
 };
 
-__attribute__((target_clones("avx2", "default"))) void AddWeighted(
-    const float* kernel, const double* feature, std::size_t n, double* s) {
+NACRE_AVX2_CLONES void AddWeighted(const float* kernel,
+                                   const double* feature,
+                                   std::size_t n,
+                                   double* s) {
   for (std::size_t i = 0; i < n; ++i) {
     s[i] += static_cast<double>(kernel[i]) * feature[i];
   }

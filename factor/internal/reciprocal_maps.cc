@@ -2,6 +2,7 @@
 
 #include "core/parallel.h"
 #include "core/rank_shares.h"
+#include "core/simd_clones.h"
 #include "factor/internal/reciprocal_fit.h"
 #include "factor/internal/reciprocal_rows.h"
 
@@ -91,8 +92,9 @@ SharedMaps OverRows(const ReciprocalData& data,
   return total;
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void Multiply(
-    const float* __restrict by, std::size_t n, float* __restrict s) {
+NACRE_SIMD_CLONES void Multiply(const float* __restrict by,
+                                std::size_t n,
+                                float* __restrict s) {
   for (std::size_t i = 0; i < n; ++i) {
     s[i] *= by[i];
   }
@@ -100,13 +102,12 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void Multiply(
 
 // Of models `s`: the weights of their changes and, in their place, what residuals pull
 // with.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void LinearizeRow(
-    const float* __restrict value,
-    const float* __restrict weight,
-    float share,
-    std::size_t n,
-    float* __restrict changes,
-    float* __restrict s) {
+NACRE_SIMD_CLONES void LinearizeRow(const float* __restrict value,
+                                    const float* __restrict weight,
+                                    float share,
+                                    std::size_t n,
+                                    float* __restrict changes,
+                                    float* __restrict s) {
   for (std::size_t i = 0; i < n; ++i) {
     const float modelled = s[i];
     const float w = share * weight[i] * modelled;

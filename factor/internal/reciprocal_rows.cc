@@ -1,16 +1,17 @@
 #include "factor/internal/reciprocal_rows.h"
 
+#include "core/simd_clones.h"
+
 #include <algorithm>
 
 namespace nacre::factor::internal {
 namespace {
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddTriple(
-    float* __restrict to,
-    const float* __restrict a,
-    const float* __restrict b,
-    const float* __restrict c,
-    std::size_t n) {
+NACRE_SIMD_CLONES void AddTriple(float* __restrict to,
+                                 const float* __restrict a,
+                                 const float* __restrict b,
+                                 const float* __restrict c,
+                                 std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     to[i] += a[i] * b[i] * c[i];
   }

@@ -1,5 +1,6 @@
 #include "factor/internal/row_scans.h"
 
+#include "core/simd_clones.h"
 #include "factor/internal/block_pass.h"
 
 #include <algorithm>
@@ -17,8 +18,7 @@ struct RowScan {
 };
 
 // Sixteen of each, so that operations don't wait for each other. A NaN is in the total.
-__attribute__((target_clones("avx512f", "avx2", "default"))) RowScan ScanValues(
-    const float* rd, std::size_t count) {
+NACRE_SIMD_CLONES RowScan ScanValues(const float* rd, std::size_t count) {
   std::array<float, kLanes> low;
   std::array<float, kLanes> high;
   std::array<double, kLanes> total{};

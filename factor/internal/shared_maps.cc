@@ -1,5 +1,7 @@
 #include "factor/internal/shared_maps.h"
 
+#include "core/simd_clones.h"
+
 #include <algorithm>
 
 namespace nacre::factor::internal {
@@ -22,21 +24,40 @@ double Dot(const SharedMaps& a, const SharedMaps& b) {
   return sum;
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
-    float* __restrict to, const float* __restrict a, float b, std::size_t n) {
+namespace {
+
+NACRE_SIMD_CLONES void AddScaledClones(float* __restrict to,
+                                       const float* __restrict a,
+                                       float b,
+                                       std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     to[i] += a[i] * b;
   }
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddProduct(
-    float* __restrict to,
-    const float* __restrict a,
-    const float* __restrict b,
-    std::size_t n) {
+NACRE_SIMD_CLONES void AddProductClones(float* __restrict to,
+                                        const float* __restrict a,
+                                        const float* __restrict b,
+                                        std::size_t n) {
   for (std::size_t i = 0; i < n; ++i) {
     to[i] += a[i] * b[i];
   }
+}
+
+}  // namespace
+
+void AddScaled(float* __restrict to,
+               const float* __restrict a,
+               float b,
+               std::size_t n) {
+  AddScaledClones(to, a, b, n);
+}
+
+void AddProduct(float* __restrict to,
+                const float* __restrict a,
+                const float* __restrict b,
+                std::size_t n) {
+  AddProductClones(to, a, b, n);
 }
 
 }  // namespace nacre::factor::internal

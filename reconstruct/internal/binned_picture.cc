@@ -1,5 +1,7 @@
 #include "reconstruct/internal/binned_picture.h"
 
+#include "core/simd_clones.h"
+
 #include <algorithm>
 #include <cstdint>
 
@@ -7,11 +9,10 @@ namespace nacre::reconstruct::internal {
 namespace {
 
 // out[x] = upper[2 x] + upper[2 x + 1] + lower[2 x] + lower[2 x + 1].
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddPairs(
-    const float* __restrict upper,
-    const float* __restrict lower,
-    std::size_t count,
-    float* __restrict out) {
+NACRE_SIMD_CLONES void AddPairs(const float* __restrict upper,
+                                const float* __restrict lower,
+                                std::size_t count,
+                                float* __restrict out) {
   for (std::size_t x = 0; x < count; ++x) {
     out[x] = (upper[2 * x] + upper[2 * x + 1]) + (lower[2 * x] + lower[2 * x + 1]);
   }
@@ -35,8 +36,9 @@ void Halve(const float* in, int width, int height, BinnedPicture& out) {
 
 // out[x], x from 1 to count − 2, of a line of 2 · count values: each shared between the
 // two nearest bins.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void ShareLine(
-    const float* __restrict in, std::size_t count, float* __restrict out) {
+NACRE_SIMD_CLONES void ShareLine(const float* __restrict in,
+                                 std::size_t count,
+                                 float* __restrict out) {
   for (std::size_t x = 1; x + 1 < count; ++x) {
     out[x] =
         0.75F * (in[2 * x] + in[2 * x + 1]) + 0.25F * (in[2 * x - 1] + in[2 * x + 2]);
@@ -44,18 +46,26 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void ShareLine(
 }
 
 // The other way round: two values of a line for each of coarse ones, from 1 on.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddGrownLine(
-    const float* __restrict own,
-    const float* __restrict other,
-    std::size_t count,
-    float* __restrict line,
-    float* __restrict out) {
+NACRE_SIMD_CLONES void AddGrownLine(const float* __restrict own,
+                                    const float* __restrict other,
+                                    std::size_t count,
+                                    float* __restrict line,
+                                    float* __restrict out) {
   for (std::size_t x = 0; x < count; ++x) {
     line[x] = 0.75F * own[x] + 0.25F * other[x];
   }
   for (std::size_t x = 1; x + 1 < count; ++x) {
     out[2 * x] += 0.75F * line[x] + 0.25F * line[x - 1];
     out[2 * x + 1] += 0.75F * line[x] + 0.25F * line[x + 1];
+  }
+}
+
+NACRE_SIMD_CLONES void AddScaledClones(const float* __restrict in,
+                                       float scale,
+                                       std::size_t count,
+                                       float* __restrict out) {
+  for (std::size_t x = 0; x < count; ++x) {
+    out[x] += scale * in[x];
   }
 }
 
@@ -68,11 +78,8 @@ void BinnedPicture::Fill(const std::vector<float>& picture, int picture_width) {
         *this);
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddScaled(
-    const float* __restrict in, float scale, std::size_t count, float* __restrict out) {
-  for (std::size_t x = 0; x < count; ++x) {
-    out[x] += scale * in[x];
-  }
+void AddScaled(const float* in, float scale, std::size_t count, float* out) {
+  AddScaledClones(in, scale, count, out);
 }
 
 void Shrink(const BinnedPicture& fine, BinnedPicture& coarse) {

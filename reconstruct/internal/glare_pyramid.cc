@@ -1,5 +1,6 @@
 #include "reconstruct/internal/glare_pyramid.h"
 
+#include "core/simd_clones.h"
 #include "reconstruct/internal/lanes.h"
 
 #include <Eigen/QR>
@@ -85,12 +86,11 @@ template <std::size_t kVectors>
 }
 
 // The same of a multiple of kLanes values.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void ApplyTaps(
-    const float* __restrict in,
-    std::size_t step,
-    std::span<const float> taps,
-    std::size_t count,
-    float* __restrict out) {
+NACRE_SIMD_CLONES void ApplyTaps(const float* __restrict in,
+                                 std::size_t step,
+                                 std::span<const float> taps,
+                                 std::size_t count,
+                                 float* __restrict out) {
   std::size_t x = 0;
   for (; x + 4 * kLanes <= count; x += 4 * kLanes) {
     SumTaps<4>(in + x, step, taps, out + x);

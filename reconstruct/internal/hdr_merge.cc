@@ -1,6 +1,7 @@
 #include "reconstruct/internal/hdr_merge.h"
 
 #include "core/error.h"
+#include "core/simd_clones.h"
 #include "reconstruct/internal/merge_kernels.h"
 
 #include <algorithm>
@@ -9,8 +10,7 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
-__attribute__((target_clones("avx2", "default"))) std::uint16_t MostCounts(
-    std::span<const std::uint16_t> pixels) {
+NACRE_AVX2_CLONES std::uint16_t MostCounts(std::span<const std::uint16_t> pixels) {
   std::uint16_t most = 0;
   for (const std::uint16_t counts : pixels) {
     most = most < counts ? counts : most;

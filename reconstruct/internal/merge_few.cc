@@ -1,4 +1,5 @@
 #include "core/error.h"
+#include "core/simd_clones.h"
 #include "reconstruct/internal/merge_kernels.h"
 
 #include <algorithm>
@@ -82,53 +83,47 @@ template <std::size_t kCount>
   }
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MergeOne(
-    const Bracket* brackets,
-    const FewBlock* counts,
-    Noise noise,
-    std::size_t pixels,
-    Result result) {
+NACRE_SIMD_CLONES void MergeOne(const Bracket* brackets,
+                                const FewBlock* counts,
+                                Noise noise,
+                                std::size_t pixels,
+                                Result result) {
   MergeOf<1>(brackets, counts, noise, pixels, result);
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MergeTwo(
-    const Bracket* brackets,
-    const FewBlock* counts,
-    Noise noise,
-    std::size_t pixels,
-    Result result) {
+NACRE_SIMD_CLONES void MergeTwo(const Bracket* brackets,
+                                const FewBlock* counts,
+                                Noise noise,
+                                std::size_t pixels,
+                                Result result) {
   MergeOf<2>(brackets, counts, noise, pixels, result);
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MergeThree(
-    const Bracket* brackets,
-    const FewBlock* counts,
-    Noise noise,
-    std::size_t pixels,
-    Result result) {
+NACRE_SIMD_CLONES void MergeThree(const Bracket* brackets,
+                                  const FewBlock* counts,
+                                  Noise noise,
+                                  std::size_t pixels,
+                                  Result result) {
   MergeOf<3>(brackets, counts, noise, pixels, result);
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MergeFour(
-    const Bracket* brackets,
-    const FewBlock* counts,
-    Noise noise,
-    std::size_t pixels,
-    Result result) {
+NACRE_SIMD_CLONES void MergeFour(const Bracket* brackets,
+                                 const FewBlock* counts,
+                                 Noise noise,
+                                 std::size_t pixels,
+                                 Result result) {
   MergeOf<4>(brackets, counts, noise, pixels, result);
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void ToFloats(
-    const std::uint16_t* __restrict counts,
-    std::size_t count,
-    float* __restrict floats) {
+NACRE_SIMD_CLONES void ToFloats(const std::uint16_t* __restrict counts,
+                                std::size_t count,
+                                float* __restrict floats) {
   for (std::size_t k = 0; k < count; ++k) {
     floats[k] = static_cast<float>(counts[k]);
   }
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) std::int64_t CountBelow0(
-    std::span<const float> values) {
+NACRE_SIMD_CLONES std::int64_t CountBelow0(std::span<const float> values) {
   std::int64_t count = 0;
   for (const float value : values) {
     count += value < 0 ? 1 : 0;

@@ -1,3 +1,4 @@
+#include "core/simd_clones.h"
 #include "reconstruct/internal/merge_kernels.h"
 
 #include <algorithm>
@@ -22,8 +23,10 @@ struct Sums {
   ManyBlock weight;
 };
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddBracket(
-    Bracket bracket, Noise noise, std::size_t count, Sums& sums) {
+NACRE_SIMD_CLONES void AddBracket(Bracket bracket,
+                                  Noise noise,
+                                  std::size_t count,
+                                  Sums& sums) {
   const float first = bracket.order == 0.0F ? 1.0F : 0.0F;
   const float ratio = bracket.Ratio();
   constexpr float kMargin2 = kMarginSigmas * kMarginSigmas;
@@ -48,8 +51,10 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void AddBracket(
 
 // The weights are those of the rate that all exposures agree on, not of each one's own
 // counts: weights that go with the noise would favour the exposures where it was low.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void AddWeighted(
-    Bracket bracket, Noise noise, std::size_t count, Sums& sums) {
+NACRE_SIMD_CLONES void AddWeighted(Bracket bracket,
+                                   Noise noise,
+                                   std::size_t count,
+                                   Sums& sums) {
   const float t = bracket.exposure_us;
   for (std::size_t k = 0; k < count; ++k) {
     const float one = sums.used[k] > bracket.order ? 1.0F : 0.0F;

@@ -1,5 +1,6 @@
 #include "reconstruct/internal/nearest_centres.h"
 
+#include "core/simd_clones.h"
 #include "reconstruct/internal/lanes.h"
 
 #include <algorithm>
@@ -18,11 +19,10 @@ constexpr int kPointsAtOnce = 4;
 using Rows = std::array<const float*, kPointsAtOnce>;
 
 // Of each point to sixteen centres.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void Distances2(
-    const Rows& rows,
-    const float* __restrict columns,
-    int dimensions,
-    std::array<float*, kPointsAtOnce> distance2) {
+NACRE_SIMD_CLONES void Distances2(const Rows& rows,
+                                  const float* __restrict columns,
+                                  int dimensions,
+                                  std::array<float*, kPointsAtOnce> distance2) {
   Lanes sum[kPointsAtOnce] = {};
   for (int d = 0; d < dimensions; ++d) {
     Lanes column;
@@ -38,8 +38,9 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void Distances2(
   }
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) float Distance2(
-    const float* __restrict a, const float* __restrict b, int dimensions) {
+NACRE_SIMD_CLONES float Distance2(const float* __restrict a,
+                                  const float* __restrict b,
+                                  int dimensions) {
   Lanes sum = {};
   int d = 0;
   for (; d + kLanes <= dimensions; d += kLanes) {

@@ -1,5 +1,6 @@
 #include "reconstruct/internal/pixel_boxes.h"
 
+#include "core/simd_clones.h"
 #include "reconstruct/internal/lanes.h"
 
 #include <algorithm>
@@ -9,12 +10,11 @@
 namespace nacre::reconstruct::internal {
 namespace {
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) void SumWithVariance(
-    const std::uint32_t* __restrict rows,
-    const float* __restrict weights,
-    std::pair<int, int> count_width,
-    const RateFrame& frame,
-    float* __restrict results) {
+NACRE_SIMD_CLONES void SumWithVariance(const std::uint32_t* __restrict rows,
+                                       const float* __restrict weights,
+                                       std::pair<int, int> count_width,
+                                       const RateFrame& frame,
+                                       float* __restrict results) {
   Lanes mean_sum = {};
   Lanes variance_sum = {};
   Lanes least_share = {};  // below 0: a pixel isn't usable
@@ -41,11 +41,10 @@ __attribute__((target_clones("avx512f", "avx2", "default"))) void SumWithVarianc
   results[1] = is_usable ? SumOf(variance_sum) : -1.0F;
 }
 
-__attribute__((target_clones("avx512f", "avx2", "default"))) float SumAlone(
-    const std::uint32_t* __restrict rows,
-    const float* __restrict weights,
-    std::pair<int, int> count_width,
-    const float* __restrict values) {
+NACRE_SIMD_CLONES float SumAlone(const std::uint32_t* __restrict rows,
+                                 const float* __restrict weights,
+                                 std::pair<int, int> count_width,
+                                 const float* __restrict values) {
   Lanes sums = {};
   const auto [count, width] = count_width;
   for (int row = 0; row < count; ++row) {

@@ -2,6 +2,7 @@
 
 #include "core/error.h"
 #include "core/random.h"
+#include "core/simd_clones.h"
 #include "reconstruct/internal/lanes.h"
 
 #include <Eigen/Eigenvalues>
@@ -22,12 +23,11 @@ constexpr int kSlicesAtOnce = 8;
 constexpr float kLeastPeak = std::numeric_limits<float>::min();
 
 // sums[slice][lane] = Σ_k shapes[slice][k] · components[k][lane], for sixteen columns.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void MultiplyColumns(
-    const float* __restrict shapes,
-    const float* __restrict components,
-    std::size_t size,
-    std::size_t stride,
-    float* __restrict sums) {
+NACRE_SIMD_CLONES void MultiplyColumns(const float* __restrict shapes,
+                                       const float* __restrict components,
+                                       std::size_t size,
+                                       std::size_t stride,
+                                       float* __restrict sums) {
   Lanes sum[kSlicesAtOnce] = {};
   for (std::size_t k = 0; k < size; ++k) {
     Lanes row;
@@ -46,10 +46,9 @@ std::size_t Stride(int dimensions) {
 }
 
 // The largest valid value, 0 if there is none above it.
-__attribute__((target_clones("avx512f", "avx2", "default"))) float PeakOf(
-    const float* __restrict rd,
-    const std::uint8_t* __restrict valid,
-    std::size_t size) {
+NACRE_SIMD_CLONES float PeakOf(const float* __restrict rd,
+                               const std::uint8_t* __restrict valid,
+                               std::size_t size) {
   float most[kLanes] = {};
   std::size_t k = 0;
   for (; k + kLanes <= size; k += kLanes) {
@@ -83,12 +82,11 @@ float Peak(std::span<const float> rd, std::span<const std::uint8_t> valid) {
 }
 
 // (ln(R'_d / peak + offset) − mean) · weight of one window; 0 where it isn't valid.
-__attribute__((target_clones("avx512f", "avx2", "default"))) void LogShape(
-    const float* __restrict rd,
-    const std::uint8_t* __restrict valid,
-    const float* __restrict mean_weight,
-    std::array<float, 2> factor_offset,
-    std::span<float> shape) {
+NACRE_SIMD_CLONES void LogShape(const float* __restrict rd,
+                                const std::uint8_t* __restrict valid,
+                                const float* __restrict mean_weight,
+                                std::array<float, 2> factor_offset,
+                                std::span<float> shape) {
   const std::size_t size = shape.size();
   const float* __restrict weight = mean_weight + size;
   float* __restrict out = shape.data();

@@ -1,6 +1,6 @@
 #include "rigs/transport/diffusion/internal/kernels.h"
 
-#include "rigs/internal/simd.h"
+#include "core/simd_clones.h"
 
 #include <algorithm>
 
@@ -81,9 +81,8 @@ template <class Real>
 }
 
 template <class Real>
-[[gnu::always_inline]] inline void ResidualBody(const LevelView<Real>& level,
-                                                const Lanes<Real>* x,
-                                                Lanes<Real>* r) {
+[[gnu::always_inline]] inline void ResidualOfColourZeroBody(
+    const LevelView<Real>& level, const Lanes<Real>* x, Lanes<Real>* r) {
   const std::size_t nz = level.nz;
   for (std::size_t j = 0; j < level.ny; ++j) {
     for (std::size_t i = j % 2; i < level.nx; i += 2) {
@@ -207,10 +206,10 @@ template <class Real>
 }
 
 template <class Real>
-[[gnu::always_inline]] inline void ApplyBody(const LevelView<Real>& level,
-                                             const Lanes<Real>* p,
-                                             Lanes<Real>* q,
-                                             LaneSums<Real>& sums) {
+[[gnu::always_inline]] inline LaneSums<Real> ApplyBody(const LevelView<Real>& level,
+                                                       const Lanes<Real>* p,
+                                                       Lanes<Real>* q) {
+  LaneSums<Real> sums{};
   using Vector = typename Lanes<Real>::Vector;
   const std::size_t nz = level.nz;
   for (std::size_t j = 0; j < level.ny; ++j) {
@@ -241,17 +240,17 @@ template <class Real>
       Collect<Real>(part, sums);
     }
   }
+  return sums;
 }
 
 template <class Real>
-// NOLINTNEXTLINE(readability-function-size): vectors of one step
-[[gnu::always_inline]] inline void StepBody(const LevelView<Real>& level,
-                                            const Lanes<Real>& a,
-                                            const Lanes<Real>* p,
-                                            const Lanes<Real>* q,
-                                            Lanes<Real>* x,
-                                            Lanes<Real>* r,
-                                            LaneSums<Real>& sums) {
+[[gnu::always_inline]] inline LaneSums<Real> StepBody(const LevelView<Real>& level,
+                                                      const Lanes<Real>& a,
+                                                      const Lanes<Real>* p,
+                                                      const Lanes<Real>* q,
+                                                      Lanes<Real>* x,
+                                                      Lanes<Real>* r) {
+  LaneSums<Real> sums{};
   for (std::size_t c = 0; c < level.nx * level.ny; ++c) {
     typename Lanes<Real>::Vector part = {};
     for (std::size_t k = c * level.nz; k < (c + 1) * level.nz; ++k) {
@@ -262,13 +261,14 @@ template <class Real>
     }
     Collect<Real>(part, sums);
   }
+  return sums;
 }
 
 template <class Real>
-[[gnu::always_inline]] inline void DotBody(const LevelView<Real>& level,
-                                           const Lanes<Real>* a,
-                                           const Lanes<Real>* b,
-                                           LaneSums<Real>& sums) {
+[[gnu::always_inline]] inline LaneSums<Real> DotBody(const LevelView<Real>& level,
+                                                     const Lanes<Real>* a,
+                                                     const Lanes<Real>* b) {
+  LaneSums<Real> sums{};
   for (std::size_t c = 0; c < level.nx * level.ny; ++c) {
     typename Lanes<Real>::Vector part = {};
     for (std::size_t k = c * level.nz; k < (c + 1) * level.nz; ++k) {
@@ -276,6 +276,7 @@ template <class Real>
     }
     Collect<Real>(part, sums);
   }
+  return sums;
 }
 
 template <class Real>
@@ -291,61 +292,70 @@ template <class Real>
 
 }  // namespace
 
-#define NACRE_DIFFUSION_KERNELS(Real)                                             \
-  NACRE_SIMD_CLONES void SolveColour(const LevelView<Real>& level,                \
-                                     unsigned colour,                             \
-                                     bool alone,                                  \
-                                     const Lanes<Real>* b,                        \
-                                     Lanes<Real>* x) {                            \
-    SolveColourBody(level, colour, alone, b, x);                                  \
-  }                                                                               \
-  NACRE_SIMD_CLONES void ResidualOfColourZero(                                    \
-      const LevelView<Real>& level, const Lanes<Real>* x, Lanes<Real>* r) {       \
-    ResidualBody(level, x, r);                                                    \
-  }                                                                               \
-  NACRE_SIMD_CLONES void Restrict(const LevelView<Real>& fine,                    \
-                                  const LevelView<Real>& coarse,                  \
-                                  const Lanes<Real>* r,                           \
-                                  Lanes<Real>* coarse_b) {                        \
-    RestrictBody(fine, coarse, r, coarse_b);                                      \
-  }                                                                               \
-  NACRE_SIMD_CLONES void Prolong(const LevelView<Real>& fine,                     \
-                                 const LevelView<Real>& coarse,                   \
-                                 const Lanes<Real>* coarse_x,                     \
-                                 Lanes<Real>* x) {                                \
-    ProlongBody(fine, coarse, coarse_x, x);                                       \
-  }                                                                               \
-  NACRE_SIMD_CLONES LaneSums<Real> Apply(                                         \
-      const LevelView<Real>& level, const Lanes<Real>* p, Lanes<Real>* q) {       \
-    LaneSums<Real> sums{};                                                        \
-    ApplyBody(level, p, q, sums);                                                 \
-    return sums;                                                                  \
-  }                                                                               \
-  NACRE_SIMD_CLONES LaneSums<Real> Step(const LevelView<Real>& level,             \
-                                        const Lanes<Real>& a,                     \
-                                        const Lanes<Real>* p,                     \
-                                        const Lanes<Real>* q,                     \
-                                        Lanes<Real>* x,                           \
-                                        Lanes<Real>* r) {                         \
-    LaneSums<Real> sums{};                                                        \
-    StepBody(level, a, p, q, x, r, sums);                                         \
-    return sums;                                                                  \
-  }                                                                               \
-  NACRE_SIMD_CLONES LaneSums<Real> Dot(                                           \
-      const LevelView<Real>& level, const Lanes<Real>* a, const Lanes<Real>* b) { \
-    LaneSums<Real> sums{};                                                        \
-    DotBody(level, a, b, sums);                                                   \
-    return sums;                                                                  \
-  }                                                                               \
-  NACRE_SIMD_CLONES void Turn(const LevelView<Real>& level,                       \
-                              const Lanes<Real>& beta,                            \
-                              const Lanes<Real>* z,                               \
-                              Lanes<Real>* p) {                                   \
-    TurnBody(level, beta, z, p);                                                  \
+#define NACRE_KERNEL(Return, Name, Parameters, Arguments) \
+  NACRE_SIMD_CLONES Return Name##Clones Parameters {      \
+    return Name##Body Arguments;                          \
+  }                                                       \
+  Return Name Parameters {                                \
+    return Name##Clones Arguments;                        \
   }
+
+#define NACRE_DIFFUSION_KERNELS(Real)                                                \
+  NACRE_KERNEL(void,                                                                 \
+               SolveColour,                                                          \
+               (const LevelView<Real>& level,                                        \
+                unsigned colour,                                                     \
+                bool alone,                                                          \
+                const Lanes<Real>* b,                                                \
+                Lanes<Real>* x),                                                     \
+               (level, colour, alone, b, x))                                         \
+  NACRE_KERNEL(void,                                                                 \
+               ResidualOfColourZero,                                                 \
+               (const LevelView<Real>& level, const Lanes<Real>* x, Lanes<Real>* r), \
+               (level, x, r))                                                        \
+  NACRE_KERNEL(void,                                                                 \
+               Restrict,                                                             \
+               (const LevelView<Real>& fine,                                         \
+                const LevelView<Real>& coarse,                                       \
+                const Lanes<Real>* r,                                                \
+                Lanes<Real>* coarse_b),                                              \
+               (fine, coarse, r, coarse_b))                                          \
+  NACRE_KERNEL(void,                                                                 \
+               Prolong,                                                              \
+               (const LevelView<Real>& fine,                                         \
+                const LevelView<Real>& coarse,                                       \
+                const Lanes<Real>* coarse_x,                                         \
+                Lanes<Real>* x),                                                     \
+               (fine, coarse, coarse_x, x))                                          \
+  NACRE_KERNEL(LaneSums<Real>,                                                       \
+               Apply,                                                                \
+               (const LevelView<Real>& level, const Lanes<Real>* p, Lanes<Real>* q), \
+               (level, p, q))                                                        \
+  NACRE_KERNEL(LaneSums<Real>,                                                       \
+               Step,                                                                 \
+               (const LevelView<Real>& level,                                        \
+                const Lanes<Real>& a,                                                \
+                const Lanes<Real>* p,                                                \
+                const Lanes<Real>* q,                                                \
+                Lanes<Real>* x,                                                      \
+                Lanes<Real>* r),                                                     \
+               (level, a, p, q, x, r))                                               \
+  NACRE_KERNEL(                                                                      \
+      LaneSums<Real>,                                                                \
+      Dot,                                                                           \
+      (const LevelView<Real>& level, const Lanes<Real>* a, const Lanes<Real>* b),    \
+      (level, a, b))                                                                 \
+  NACRE_KERNEL(void,                                                                 \
+               Turn,                                                                 \
+               (const LevelView<Real>& level,                                        \
+                const Lanes<Real>& beta,                                             \
+                const Lanes<Real>* z,                                                \
+                Lanes<Real>* p),                                                     \
+               (level, beta, z, p))
 
 NACRE_DIFFUSION_KERNELS(float)
 NACRE_DIFFUSION_KERNELS(double)
 #undef NACRE_DIFFUSION_KERNELS
+#undef NACRE_KERNEL
 
 }  // namespace nacre::rigs::diffusion::internal

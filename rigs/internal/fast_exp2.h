@@ -3,16 +3,6 @@
 #include <bit>
 #include <cstdint>
 
-/// Marks a hot loop to be compiled for several instruction sets, chosen at run time.
-/// -ffp-contract=off keeps the results of all of them equal to the last bit. Sanitizers
-/// can't take the resolver that runs before their own start-up.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(NACRE_NO_TARGET_CLONES)
-#define NACRE_SIMD_CLONES __attribute__((target_clones("avx512f", "avx2", "default")))
-#else
-#define NACRE_SIMD_CLONES
-#endif
-
 namespace nacre::rigs::internal {
 
 /// 2^x to 3e-7 relative for x in [-126, 127], clamped below: straight-line code that
