@@ -198,6 +198,28 @@ TEST(Sss, OnlyProfilesOfThreeChannelsAreWritten) {
   EXPECT_THROW(ReadSss(folder / "none.sss", {.pitch_mm = 0}), Error);
 }
 
+TEST(Sss, EqualChannelsAreWrittenThreeTimes) {
+  const TempFolder folder;
+  reconstruct::RdDataset dataset =
+      nacre::testing::MakeChessboard({.points_x = 12, .points_y = 9, .core = 7});
+  const auto window = static_cast<std::ptrdiff_t>(dataset.header.WindowSize());
+  for (auto slice = dataset.rd.begin(); slice != dataset.rd.end();
+       slice += 3 * window) {
+    std::copy_n(slice, window, slice + window);
+    std::copy_n(slice, window, slice + 2 * window);
+  }
+  const Material m =
+      Factor(dataset, {.method = "profiles", .terms = 3, .bits = 32}).material;
+  ASSERT_TRUE(m.is_grey);
+  WriteSss(folder / "m.sss", m);
+  const Material read =
+      ReadSss(folder / "m.sss", {.pitch_mm = m.pitch_mm, .eta = m.eta});
+  for (int n = 0; n < 3 * 49; ++n) {
+    const float before = m.Evaluate(0, 6, 4, n % 7, n / 7 % 7);
+    EXPECT_NEAR(read.Evaluate(n / 49, 6, 4, n % 7, n / 7 % 7) / before, 1, 1e-4F) << n;
+  }
+}
+
 // What is fitted survives the way through a file, but for what it can't hold.
 TEST(Sss, AFitGoesThroughAFile) {
   const TempFolder folder;

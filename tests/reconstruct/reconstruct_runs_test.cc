@@ -2,6 +2,7 @@
 
 #include "core/atomic_file.h"
 #include "core/error.h"
+#include "core/sanitizers.h"
 #include "reconstruct/reconstruct.h"
 #include "tests/reconstruct/striped_session.h"
 #include "tests/support/error_message.h"
@@ -62,6 +63,9 @@ std::size_t StatusKb(const std::string& key) {
 }
 
 TEST_F(ReconstructTest, MemoryStaysUnderTheBoundOnASessionEightTimesLarger) {
+#if NACRE_UNDER_ASAN
+  GTEST_SKIP() << "AddressSanitizer keeps what was given back";
+#endif
   double session_bytes = 0;
   for (const auto& file :
        std::filesystem::directory_iterator(Path("session") / "frames")) {
