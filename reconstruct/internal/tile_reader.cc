@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <fmt/format.h>
+#include <stdexcept>
 
 namespace nacre::reconstruct::internal {
 
@@ -28,6 +30,9 @@ void TileReader::Read(int i, int j) {
   const char* bytes = nullptr;
   int count = 0;
   part_.rawTileData(tile_x, tile_y, level_x, level_y, bytes, count);
+  if (count < 0) {  // OpenEXR lets such a size of a damaged file through
+    throw std::runtime_error(fmt::format("its tile has {} bytes", count));
+  }
   const std::span<const char> stored(bytes, static_cast<std::size_t>(count));
   // OpenEXR, too, takes so many bytes for numbers, whatever the compression. They are
   // little endian.
