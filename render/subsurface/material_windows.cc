@@ -340,7 +340,8 @@ void MaterialWindows::Prefetch(int window,
                                float row) const {
   const auto w = static_cast<std::size_t>(window);
   const Cell* kept = kept_[w].load(std::memory_order_relaxed);
-  const WindowProfile* profile = profiles_[w].load(std::memory_order_relaxed);
+  // What it holds is read, of `kept` the address alone.
+  const WindowProfile* profile = profiles_[w].load(std::memory_order_acquire);
   const int u = static_cast<int>(column + radius_);
   const int v = static_cast<int>(row + radius_);
   if (kept == nullptr || profile == nullptr || u < 0 || v < 0 || u >= source_->core ||
