@@ -202,7 +202,7 @@ TEST(Sss, EqualChannelsAreWrittenThreeTimes) {
   const TempFolder folder;
   reconstruct::RdDataset dataset =
       nacre::testing::MakeChessboard({.points_x = 12, .points_y = 9, .core = 7});
-  const auto window = static_cast<std::ptrdiff_t>(dataset.header.WindowSize());
+  const std::ptrdiff_t window = dataset.header.WindowSize();
   for (auto slice = dataset.rd.begin(); slice != dataset.rd.end();
        slice += 3 * window) {
     std::copy_n(slice, window, slice + window);
